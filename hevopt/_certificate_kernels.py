@@ -1,0 +1,100 @@
+"""Compiled parts of the certificates; the mathematics is in certificate.py."""
+
+import numpy as np
+from numba import njit
+
+from hevopt._battery_kernels import chemical_power, state_at
+
+
+@njit(cache=True)
+def drain_and_slope(power, energy, battery):
+    """Rate at which stored energy falls and its derivative by stored energy, resistance held constant."""
+    i = 0
+    while i < len(battery.energy_j) - 2 and energy >= battery.energy_j[i + 1]:
+        i += 1
+    width = battery.soc[i + 1] - battery.soc[i]
+    volt_slope = (battery.open_circuit_v[i + 1] - battery.open_circuit_v[i]) / width
+    _, voltage, discharge, charging = state_at(energy, battery)
+    resistance = charging if power < 0.0 else discharge
+    drain = chemical_power(power, voltage, discharge, charging, battery.coulombic_efficiency)
+    root = np.sqrt(voltage * voltage - 4.0 * resistance * power)
+    current = 2.0 * power / (voltage + root)
+    by_voltage = -2.0 * resistance * current * current / root
+    if power < 0.0:
+        by_voltage *= battery.coulombic_efficiency
+    return drain, by_voltage * volt_slope / (battery.capacity_as * voltage)
+
+
+@njit(cache=True)
+def costate(energy, power, step_s, battery):
+    """Prices (time,) of x_1 ... x_T that make a rollout stationary, 1 at the end."""
+    steps = len(power)
+    price = np.ones(steps)
+    for k in range(steps - 1, 0, -1):
+        _, slope = drain_and_slope(power[k], energy[k], battery)
+        price[k - 1] = price[k] * max(1.0 - step_s[k] * slope, 0.0)
+    return price
+
+
+@njit(cache=True)
+def worth_by_tangents(first, power, step_s, price, rollout, low, high, battery):
+    """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex in x."""
+    worth = np.empty(len(power))
+    for k in range(len(step_s)):
+        after = price[k]
+        for i in range(first[k, 0], first[k, -1]):
+            if k == 0:
+                worth[i] = after * step_s[0] * drain_and_slope(power[i], rollout[0], battery)[0]
+                continue
+            tilt = price[k - 1] - after
+            middle = min(max(rollout[k], low), high)
+            best = -np.inf
+            left_x, left_y, left_s = 0.0, 0.0, 0.0
+            for n in range(3):
+                x = low if n == 0 else (middle if n == 1 else high)
+                drain, slope = drain_and_slope(power[i], x, battery)
+                y = after * step_s[k] * drain + tilt * x
+                s = after * step_s[k] * slope + tilt
+                if s >= 0.0:
+                    # The envelope turns upward here: its least is where this tangent meets the last.
+                    best = y if n == 0 else _meeting(left_x, left_y, left_s, x, y, s)
+                    break
+                left_x, left_y, left_s = x, y, s
+                best = y
+            worth[i] = best
+    return worth
+
+
+@njit(cache=True)
+def _meeting(x1, y1, s1, x2, y2, s2):
+    """Height at which a falling tangent at x1 meets a rising one at x2."""
+    if s2 - s1 <= 0.0:
+        return min(y1, y2)
+    x = (y2 - s2 * x2 - y1 + s1 * x1) / (s1 - s2)
+    x = min(max(x, x1), x2)
+    return max(y1 + s1 * (x - x1), y2 + s2 * (x - x2))
+
+
+@njit(cache=True)
+def worth_by_cells(
+    first, power, step_s, price, rollout, edges, voltage, discharge, charging, battery
+):
+    """As worth_by_tangents, for any curves: the least over cells, r from below within each."""
+    worth = np.empty(len(power))
+    efficiency = battery.coulombic_efficiency
+    for k in range(len(step_s)):
+        after = price[k]
+        for i in range(first[k, 0], first[k, -1]):
+            if k == 0:
+                worth[i] = after * step_s[0] * drain_and_slope(power[i], rollout[0], battery)[0]
+                continue
+            tilt = price[k - 1] - after
+            best = np.inf
+            for c in range(len(voltage)):
+                drain = chemical_power(power[i], voltage[c], discharge[c], charging[c], efficiency)
+                if np.isnan(drain):
+                    continue
+                x = edges[c] if tilt >= 0.0 else edges[c + 1]
+                best = min(best, after * step_s[k] * drain + tilt * x)
+            worth[i] = best
+    return worth

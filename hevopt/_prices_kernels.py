@@ -1,0 +1,52 @@
+"""Compiled shortest path over modes; see prices.py."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def block_minima(first, value):
+    """(time, mode) least value of each block and its entry; inf and -1 where the block is empty."""
+    steps, modes = first.shape[0], first.shape[1] - 1
+    least = np.full((steps, modes), np.inf)
+    entry = np.full((steps, modes), -1, dtype=np.int64)
+    for k in range(steps):
+        for m in range(modes):
+            for i in range(first[k, m], first[k, m + 1]):
+                if value[i] < least[k, m]:
+                    least[k, m] = value[i]
+                    entry[k, m] = i
+    return least, entry
+
+
+@njit(cache=True)
+def mode_path(least, switch_kg, allowed):
+    """Cost-to-go (time + 1, mode) and best next mode (time, mode) of (time, mode) least values."""
+    steps, modes = least.shape
+    to_go = np.zeros((steps + 1, modes))
+    follow = np.zeros((steps, modes), dtype=np.int64)
+    for k in range(steps - 1, -1, -1):
+        for m in range(modes):
+            best = np.inf
+            for n in range(modes):
+                if allowed[m, n]:
+                    total = switch_kg[m, n] + least[k, n] + to_go[k + 1, n]
+                    if total < best:
+                        best = total
+                        follow[k, m] = n
+            to_go[k, m] = best
+    return to_go, follow
+
+
+@njit(cache=True)
+def shortest_path(first, value, switch_kg, allowed, start_mode):
+    """Least total of (entry,) values and switching, its (time,) entries, cost-to-go (time + 1, mode)."""
+    least, entry = block_minima(first, value)
+    to_go, follow = mode_path(least, switch_kg, allowed)
+    path = np.zeros(len(least), dtype=np.int64)
+    if np.isfinite(to_go[0, start_mode]):
+        mode = start_mode
+        for k in range(len(least)):
+            mode = follow[k, mode]
+            path[k] = entry[k, mode]
+    return to_go[0, start_mode], path, to_go

@@ -1,0 +1,485 @@
+"""Architecture and component files: TOML, checked by pydantic, read into frozen types.
+
+An architecture names its components; a name is looked for in `components/` beside the file, then among the
+shipped ones, and a path is relative to the file.
+"""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hevopt.battery import Battery
+from hevopt.datafile import FileModel, Model, read_toml
+from hevopt.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
+from hevopt.errors import DataError
+from hevopt.files import find, shipped_folder
+from hevopt.machine import Machine
+from hevopt.transmission import Gearbox
+from hevopt.units import TO_SI
+from hevopt.vehicle import Vehicle
+
+Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
+CouplingKind = Literal[
+    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
+]
+Fraction = Annotated[float, Field(gt=0, le=1)]
+Soc = Annotated[float, Field(ge=0, le=1)]
+Positive = Annotated[float, Field(gt=0, le=1e9)]
+NotNegative = Annotated[float, Field(ge=0, le=1e9)]
+Curve = Annotated[list[float], Field(min_length=2, max_length=10_000)]
+
+
+class CouplingFile(FileModel):
+    """How the machine joins the shafts."""
+
+    kind: CouplingKind
+    second_clutch: bool | None = None
+    machine_ratio: Annotated[float, Field(gt=0, le=50)] | None = None
+    machine_efficiency: Fraction | None = None
+    disconnects_above_speed_max: bool = False
+    machine_shift_fuel_g: Annotated[float, Field(ge=0, le=10)] = 0.0
+
+    @model_validator(mode="after")
+    def _keys_of_kind(self):
+        needed = {
+            "gearbox_input": {"second_clutch"},
+            "gearbox_output": {"machine_ratio", "machine_efficiency"},
+        }.get(self.kind, set())
+        allowed = {
+            "gearbox_output": needed | {"disconnects_above_speed_max"},
+            "even_shaft": {"machine_shift_fuel_g"},
+        }.get(self.kind, needed)
+        given = self.model_fields_set - {"kind"}
+        if missing := needed - given:
+            raise ValueError(f"kind {self.kind!r} needs {', '.join(sorted(missing))}")
+        if extra := given - allowed:
+            raise ValueError(f"kind {self.kind!r} does not use {', '.join(sorted(extra))}")
+        return self
+
+
+class ArchitectureFile(FileModel):
+    """An architecture: its components' names, functions (Table 1) and coupling."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    description: str = ""
+    car: str
+    engine: str
+    gearbox: str
+    machine: str
+    battery: str
+    hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
+    functions: list[Function]
+    coupling: CouplingFile
+
+
+class RoadLoadFile(FileModel):
+    """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12)."""
+
+    rolling_c0: Annotated[float, Field(ge=0, le=0.2)] | None = None
+    rolling_c1_spm: float = 0.0
+    rolling_c2_s2pm2: float = 0.0
+    rolling_c3_s3pm3: float = 0.0
+    drag_area_m2: Annotated[float, Field(ge=0, le=20)] | None = None
+    air_density_kgpm3: Annotated[float, Field(gt=0, le=2)] = 1.2
+    coastdown_c0_n: NotNegative | None = None
+    coastdown_c1_nspm: float = 0.0
+    coastdown_c2_ns2pm2: float = 0.0
+
+    @model_validator(mode="after")
+    def _one_form(self):
+        coefficients = self.coastdown_c0_n is not None
+        parts = self.rolling_c0 is not None and self.drag_area_m2 is not None
+        if coefficients == parts:
+            raise ValueError("give either rolling_c0 and drag_area_m2, or coastdown_c0_n")
+        return self
+
+
+class CarFile(FileModel):
+    """A car without powertrain."""
+
+    name: str
+    mass_kg: Annotated[float, Field(ge=50, le=100_000)]
+    tyre_radius_m: Annotated[float, Field(ge=0.1, le=1.5)]
+    wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
+    auxiliary_power_w: Annotated[float, Field(ge=0, le=50_000)]
+    road_load: RoadLoadFile
+
+
+class FuelFile(FileModel):
+    heating_value_mjpkg: Annotated[float, Field(ge=5, le=150)]
+    density_kgpl: Annotated[float, Field(ge=0.05, le=2)]
+    co2_kgpkg: Annotated[float, Field(ge=0, le=5)]
+
+
+class FullLoadFile(FileModel):
+    speed_rpm: Curve
+    torque_nm: Curve
+
+    @model_validator(mode="after")
+    def _curve(self):
+        if len(self.speed_rpm) != len(self.torque_nm):
+            raise ValueError("speed_rpm and torque_nm must have one length")
+        if min(self.speed_rpm) < 0 or (np.diff(self.speed_rpm) <= 0).any():
+            raise ValueError("speed_rpm must be >= 0 and increase")
+        if min(self.torque_nm) <= 0:
+            raise ValueError(f"every torque_nm must be > 0, found {min(self.torque_nm):g}")
+        return self
+
+
+class FuelCoefficientsFile(FileModel):
+    a: Annotated[float, Field(gt=0)]
+    b: float
+    c: float
+    a2: Annotated[float, Field(le=0)]
+    l: Annotated[float, Field(lt=0)]  # noqa: E741
+    l2: Annotated[float, Field(le=0)]
+
+
+class NoxCoefficientsFile(FileModel):
+    m0: NotNegative
+    lo: NotNegative
+    hi: NotNegative
+    p0: float
+    p1: float
+    dp: Positive
+
+
+class EngineGridFile(FileModel):
+    """A measured map: rows are speeds, columns torques; nan marks a cell that was not measured."""
+
+    speed_rpm: Curve
+    torque_nm: Curve
+    fuel_gps: list[list[Annotated[float, Field(allow_inf_nan=True)]]]
+    nox_gps: list[list[Annotated[float, Field(allow_inf_nan=True)]]] | None = None
+    motoring_torque_nm: Curve
+
+    @model_validator(mode="after")
+    def _shapes(self):
+        shape = (len(self.speed_rpm), len(self.torque_nm))
+        for name in ("fuel_gps", "nox_gps"):
+            grid = getattr(self, name)
+            if grid is None:
+                continue
+            if len(grid) != shape[0] or any(len(row) != shape[1] for row in grid):
+                raise ValueError(f"{name} must have {shape[0]} rows of {shape[1]} values")
+            if np.nanmin(grid) < 0 or np.isinf(grid).any():
+                raise ValueError(f"{name} must be finite and >= 0, or nan where not measured")
+        if len(self.motoring_torque_nm) != shape[0] or max(self.motoring_torque_nm) >= 0:
+            raise ValueError(f"motoring_torque_nm must be {shape[0]} values below 0")
+        if (np.diff(self.speed_rpm) <= 0).any() or (np.diff(self.torque_nm) <= 0).any():
+            raise ValueError("speed_rpm and torque_nm must increase")
+        return self
+
+
+class EngineFile(FileModel):
+    name: str
+    displacement_cm3: Annotated[float, Field(ge=10, le=100_000)]
+    bore_mm: Annotated[float, Field(ge=10, le=1000)]
+    stroke_mm: Annotated[float, Field(ge=10, le=1000)]
+    idle_rpm: Annotated[float, Field(ge=50, le=5000)]
+    inertia_kgm2: Annotated[float, Field(ge=0, le=100)]
+    start_fuel_g: Annotated[float, Field(ge=0, le=100)]
+    fuel: FuelFile
+    full_load: FullLoadFile
+    fuel_coefficients: FuelCoefficientsFile | None = None
+    fuel_map: EngineGridFile | None = None
+    nox_coefficients: NoxCoefficientsFile | None = None
+
+    @model_validator(mode="after")
+    def _one_map(self):
+        if (self.fuel_coefficients is None) == (self.fuel_map is None):
+            raise ValueError("give either fuel_coefficients or fuel_map")
+        if self.fuel_map is not None and self.nox_coefficients is not None:
+            raise ValueError("with fuel_map, NOx is nox_gps in the map, not nox_coefficients")
+        low, high = self.full_load.speed_rpm[0], self.full_load.speed_rpm[-1]
+        if not low <= self.idle_rpm < high:
+            raise ValueError(
+                f"idle_rpm {self.idle_rpm:g} must lie within full_load.speed_rpm, {low:g} to {high:g}"
+            )
+        return self
+
+
+class ShiftSpeedsFile(FileModel):
+    up_kmh: list[Positive]
+    down_kmh: list[Positive]
+    engage_before_launch_s: Annotated[float, Field(ge=0, le=60)] = 1.0
+
+
+class GearboxFile(FileModel):
+    name: str
+    ratios: Annotated[list[Positive], Field(min_length=1, max_length=20)]
+    final_drive_ratio: Annotated[float, Field(gt=0, le=50)]
+    efficiency: Fraction | list[Fraction]
+    shift_speeds: ShiftSpeedsFile
+
+    @model_validator(mode="after")
+    def _lengths(self):
+        gears, shifts = len(self.ratios), self.shift_speeds
+        if isinstance(self.efficiency, list) and len(self.efficiency) != gears:
+            raise ValueError(f"efficiency needs one value or {gears}, one per gear")
+        if len(shifts.up_kmh) != gears - 1 or len(shifts.down_kmh) != gears - 1:
+            raise ValueError(f"shift_speeds need {gears - 1} values each for {gears} gears")
+        if list(self.ratios) != sorted(self.ratios, reverse=True):
+            raise ValueError("ratios must fall from first gear to last")
+        if any(d >= u for u, d in zip(shifts.up_kmh, shifts.down_kmh, strict=True)):
+            raise ValueError("each down_kmh must be below its up_kmh")
+        if sorted(shifts.up_kmh) != shifts.up_kmh or sorted(shifts.down_kmh) != shifts.down_kmh:
+            raise ValueError("shift speeds must rise from gear to gear")
+        return self
+
+
+class MachineFile(FileModel):
+    name: str
+    kind: Literal["loss", "efficiency"]
+    power_max_w: Positive
+    torque_max_nm: Positive | None = None
+    speed_max_rpm: Positive | None = None
+    inertia_kgm2: Annotated[float, Field(ge=0, le=100)] = 0.0
+    efficiency: Fraction | None = None
+    loss_c0_w: NotNegative | None = None
+    loss_c1_ws: NotNegative | None = None
+    loss_c2_ws2: NotNegative | None = None
+    loss_c3_wpnm2: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _keys_of_kind(self):
+        losses = [self.loss_c0_w, self.loss_c1_ws, self.loss_c2_ws2, self.loss_c3_wpnm2]
+        if self.kind == "loss" and (None in losses or self.efficiency is not None):
+            raise ValueError(
+                "kind 'loss' needs loss_c0_w, loss_c1_ws, loss_c2_ws2, loss_c3_wpnm2 and no efficiency"
+            )
+        if self.kind == "efficiency" and (self.efficiency is None or any(losses)):
+            raise ValueError("kind 'efficiency' needs efficiency and no loss_c*")
+        return self
+
+
+class LinearVoltageFile(FileModel):
+    intercept: Positive
+    slope: NotNegative
+
+
+class SocFile(FileModel):
+    start: Soc
+    min: Soc
+    max: Soc
+
+    @model_validator(mode="after")
+    def _window(self):
+        if not self.min < self.max:
+            raise ValueError(f"empty window: min {self.min:g} must be below max {self.max:g}")
+        if not self.min <= self.start <= self.max:
+            raise ValueError(f"start {self.start:g} must lie in [{self.min:g}, {self.max:g}]")
+        return self
+
+
+class BatteryFile(FileModel):
+    """A battery of equal cells in series, figures per cell, over SOC where they are lists."""
+
+    name: str
+    cells_in_series: Annotated[int, Field(ge=1, le=10_000)]
+    capacity_ah: Positive
+    open_circuit_v: LinearVoltageFile | list[Positive]
+    resistance_ohm: NotNegative | list[NotNegative] | None = None
+    discharge_ohm: NotNegative | list[NotNegative] | None = None
+    charge_ohm: NotNegative | list[NotNegative] | None = None
+    curve_soc: list[Soc] | None = None
+    coulombic_efficiency: Fraction = 1.0
+    power_max_w: Positive | None = None
+    current_max_a: Positive | None = None
+    soc: SocFile
+
+    @model_validator(mode="after")
+    def _curves(self):
+        if (self.resistance_ohm is None) == (self.discharge_ohm is None or self.charge_ohm is None):
+            raise ValueError("give either resistance_ohm, or discharge_ohm and charge_ohm")
+        lists = [v for v in (self.open_circuit_v, *self.resistances()) if isinstance(v, list)]
+        if lists and self.curve_soc is None:
+            raise ValueError("values over SOC need curve_soc")
+        if any(len(v) != len(self.curve_soc) for v in lists):
+            raise ValueError(f"values over SOC need {len(self.curve_soc)} entries, as curve_soc")
+        if self.curve_soc is not None and (
+            len(self.curve_soc) < 2 or (np.diff(self.curve_soc) <= 0).any()
+        ):
+            raise ValueError("curve_soc must increase and have at least 2 entries")
+        return self
+
+    def resistances(self) -> tuple:
+        """Discharge and charge resistance as given."""
+        if self.resistance_ohm is not None:
+            return self.resistance_ohm, self.resistance_ohm
+        return self.discharge_ohm, self.charge_ohm
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """How the machine joins the shafts; see couplings.py."""
+
+    kind: CouplingKind
+    second_clutch: bool
+    machine_ratio: float
+    machine_efficiency: float
+    disconnects_above_speed_max: bool
+    machine_shift_fuel_kg: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Architecture:
+    """A complete car: every component, the coupling and the functions it may use."""
+
+    name: str
+    description: str
+    vehicle: Vehicle
+    engine: Engine
+    gearbox: Gearbox
+    machine: Machine
+    battery: Battery
+    soc_start: float
+    coupling: Coupling
+    functions: frozenset[str]
+    source: Path
+
+
+def load_architecture(name: str | Path) -> Architecture:
+    """The architecture of a shipped name (`C2`) or a TOML file's path."""
+    path = find("architectures", name, ".toml")
+    data = read_toml(path, ArchitectureFile)
+    battery = _component(path, "battery", data.battery, BatteryFile)
+    coupling = data.coupling
+    return Architecture(
+        name=data.name,
+        description=data.description,
+        vehicle=_vehicle(_component(path, "car", data.car, CarFile), data.hybrid_mass_kg),
+        engine=_engine(_component(path, "engine", data.engine, EngineFile)),
+        gearbox=_gearbox(_component(path, "gearbox", data.gearbox, GearboxFile)),
+        machine=_machine(_component(path, "machine", data.machine, MachineFile)),
+        battery=_battery(battery),
+        soc_start=battery.soc.start,
+        coupling=Coupling(
+            coupling.kind,
+            bool(coupling.second_clutch),
+            coupling.machine_ratio or 1.0,
+            coupling.machine_efficiency or 1.0,
+            coupling.disconnects_above_speed_max,
+            coupling.machine_shift_fuel_g * TO_SI["_g"][1],
+        ),
+        functions=frozenset(data.functions),
+        source=path,
+    )
+
+
+def _component(path: Path, key: str, name: str, model: type[Model]) -> Model:
+    beside = path.parent / "components"
+    if "/" in name or "\\" in name or name.endswith(".toml"):
+        beside = path.parent
+    folder = beside if beside.is_dir() else shipped_folder("architectures") / "components"
+    try:
+        return read_toml(find("architectures/components", name, ".toml", beside=folder), model)
+    except DataError as error:
+        if str(error).startswith(("architectures/components", "architectures/component ")):
+            raise DataError(f"{path}, {key}: {error}") from None
+        raise
+
+
+def _vehicle(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
+    load, mass_kg = car.road_load, car.mass_kg + hybrid_mass_kg
+    if load.coastdown_c0_n is not None:
+        rolling = (0.0, 0.0, 0.0, 0.0)
+        air = (load.coastdown_c0_n, load.coastdown_c1_nspm, load.coastdown_c2_ns2pm2, 0.0)
+    else:
+        weight_n = mass_kg * 9.80665
+        polynomial = (
+            load.rolling_c0,
+            load.rolling_c1_spm,
+            load.rolling_c2_s2pm2,
+            load.rolling_c3_s3pm3,
+        )
+        rolling = tuple(weight_n * c for c in polynomial)
+        air = (0.0, 0.0, load.air_density_kgpm3 / 2 * load.drag_area_m2, 0.0)
+    return Vehicle(
+        car.name,
+        mass_kg,
+        car.tyre_radius_m,
+        car.wheel_inertia_kgm2,
+        car.auxiliary_power_w,
+        rolling,
+        air,
+    )
+
+
+def _engine(data: EngineFile) -> Engine:
+    rpm, gram = TO_SI["_rpm"][1], TO_SI["_g"][1]
+    if data.fuel_map is not None:
+        grid = data.fuel_map
+        nox = grid.nox_gps or np.zeros((len(grid.speed_rpm), len(grid.torque_nm)))
+        fuel = EngineGrid(
+            np.array(grid.speed_rpm) * rpm,
+            np.array(grid.torque_nm),
+            np.array(grid.fuel_gps) * gram,
+            np.array(nox) * gram,
+            np.array(grid.motoring_torque_nm),
+        )
+    else:
+        fuel = FuelCoefficients(**data.fuel_coefficients.model_dump())
+    nox = data.nox_coefficients
+    return Engine(
+        name=data.name,
+        displacement_m3=data.displacement_cm3 * TO_SI["_cm3"][1],
+        stroke_m=data.stroke_mm * TO_SI["_mm"][1],
+        idle_radps=data.idle_rpm * rpm,
+        inertia_kgm2=data.inertia_kgm2,
+        start_fuel_kg=data.start_fuel_g * gram,
+        heating_value_jpkg=data.fuel.heating_value_mjpkg * TO_SI["_mjpkg"][1],
+        fuel_density_kgpm3=data.fuel.density_kgpl * TO_SI["_kgpl"][1],
+        co2_kgpkg=data.fuel.co2_kgpkg,
+        full_load_speed_radps=np.array(data.full_load.speed_rpm) * rpm,
+        full_load_torque_nm=np.array(data.full_load.torque_nm),
+        fuel=fuel,
+        nox=None if nox is None else NoxCoefficients(**nox.model_dump()),
+    )
+
+
+def _gearbox(data: GearboxFile) -> Gearbox:
+    gears, kmh = len(data.ratios), TO_SI["_kmh"][1]
+    efficiency = data.efficiency if isinstance(data.efficiency, list) else [data.efficiency] * gears
+    return Gearbox(
+        data.name,
+        np.array([1.0, *data.ratios]) * data.final_drive_ratio,
+        np.array([1.0, *efficiency]),
+        np.array(data.shift_speeds.up_kmh) * kmh,
+        np.array(data.shift_speeds.down_kmh) * kmh,
+        data.shift_speeds.engage_before_launch_s,
+    )
+
+
+def _machine(data: MachineFile) -> Machine:
+    loss = (data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
+    return Machine(
+        data.name,
+        data.power_max_w,
+        data.torque_max_nm or inf,
+        (data.speed_max_rpm or inf) * TO_SI["_rpm"][1],
+        data.inertia_kgm2,
+        loss if data.kind == "loss" else None,
+        data.efficiency,
+    )
+
+
+def _battery(data: BatteryFile) -> Battery:
+    cells = data.cells_in_series
+    points = np.array(data.curve_soc or [0.0, 1.0])
+    voltage = data.open_circuit_v
+    if isinstance(voltage, LinearVoltageFile):
+        voltage = voltage.intercept + voltage.slope * points
+    discharge, charge = (np.broadcast_to(r, points.shape) * cells for r in data.resistances())
+    power_max_w = (data.power_max_w or inf) * cells
+    current_max_a = data.current_max_a or inf
+    return Battery(
+        points, np.array(voltage) * cells, discharge, charge,
+        data.capacity_ah * TO_SI["_ah"][1], data.coulombic_efficiency,
+        data.soc.min, data.soc.max,
+        power_max_w, power_max_w, current_max_a, current_max_a,
+    )  # fmt: skip

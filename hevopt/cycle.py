@@ -1,0 +1,185 @@
+"""Driving cycles: a CSV file of speed over time, checked and read into a frozen type.
+
+Columns: `time_s`; one of `speed_mps`, `speed_kmh`, `speed_mph`; optional `gear` (0 neutral), `clutch_open`
+(0 or 1), `grade` (rise / run). Row k of gear, clutch and grade holds from its time to the next.
+Lines that begin with # are comments.
+"""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.files import find, read_text
+from hevopt.units import TO_SI
+
+_SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
+_COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
+_SPEED_MAX_MPS = 100.0
+_GRADE_MAX = 0.5
+_STEP_MAX_S = 3600.0
+# Twice the friction limit of a dry road: nothing on tyres does more.
+_ACCELERATION_MAX_MPS2 = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cycle:
+    """A speed trace. `gear` and `clutch_open` are None where the file lists none.
+
+    time_s, speed_mps: (sample,)
+    gear: (sample,) 0 neutral; clutch_open: (sample,) bool; grade: (sample,) rise / run
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+    grade: NDArray[np.float64]
+    gear: NDArray[np.int64] | None = None
+    clutch_open: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        for field in ("time_s", "speed_mps", "grade", "gear", "clutch_open"):
+            values = getattr(self, field)
+            if values is not None:
+                values = np.array(values)
+                values.flags.writeable = False
+                object.__setattr__(self, field, values)
+
+    @property
+    def distance_m(self) -> float:
+        """Distance driven, by the trapezoidal rule."""
+        return float(np.sum(np.diff(self.time_s) * (self.speed_mps[1:] + self.speed_mps[:-1]) / 2))
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last sample."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+
+def load_cycle(name: str | Path) -> Cycle:
+    """The cycle of a shipped name (`nedc`) or a CSV file's path; DataError names line and value."""
+    path = find("cycles", name, ".csv")
+    header, rows = _rows(path, read_text(path))
+    columns = {name: np.array([row[i] for _, row in rows]) for i, name in enumerate(header)}
+    lines = [line for line, _ in rows]
+    speed_column = next(c for c in _SPEED_COLUMNS if c in columns)
+    factor = TO_SI.get(speed_column.removeprefix("speed"), ("", 1.0))[1]
+    speed_mps = columns[speed_column] * factor
+    grade = columns.get("grade", np.zeros(len(rows)))
+    _check_time_and_speed(path, lines, columns["time_s"], speed_mps, speed_column, factor)
+    _check_range(path, lines, "grade", grade, -_GRADE_MAX, _GRADE_MAX)
+    gear = clutch_open = None
+    if "gear" in columns:
+        gear = _whole_numbers(path, lines, "gear", columns["gear"], 20)
+        clutch = columns.get("clutch_open", np.zeros(len(rows)))
+        clutch_open = _whole_numbers(path, lines, "clutch_open", clutch, 1).astype(bool)
+    return Cycle(path.stem, columns["time_s"], speed_mps, grade, gear, clutch_open)
+
+
+def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]]]]:
+    """Header names and the numbers of every data line, with its line number."""
+    header: list[str] | None = None
+    rows: list[tuple[int, list[float]]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            cells = [cell.strip() for cell in next(csv.reader([line], strict=True))]
+        except csv.Error as error:
+            raise DataError(f"{path}, line {number}: not a CSV line ({error})") from None
+        if header is None:
+            header = _checked_header(path, number, cells)
+            continue
+        if len(cells) != len(header):
+            raise DataError(
+                f"{path}, line {number}: {len(cells)} values, the header has {len(header)}"
+            )
+        rows.append((number, [_number(path, number, *pair) for pair in zip(header, cells)]))  # noqa: B905
+    if header is None:
+        raise DataError(f"{path}: empty; expected a header line such as time_s,speed_kmh")
+    if len(rows) < 2:
+        raise DataError(f"{path}: {len(rows)} data lines; a cycle needs at least 2")
+    return header, rows
+
+
+def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
+    unknown = [cell for cell in cells if cell not in _COLUMNS]
+    if unknown:
+        raise DataError(
+            f"{path}, line {number}: unknown column {unknown[0]!r}; allowed: {', '.join(_COLUMNS)}"
+        )
+    if len(set(cells)) != len(cells):
+        raise DataError(f"{path}, line {number}: a column name stands twice: {','.join(cells)}")
+    speeds = [cell for cell in cells if cell in _SPEED_COLUMNS]
+    if "time_s" not in cells or len(speeds) != 1:
+        raise DataError(
+            f"{path}, line {number}: found columns {', '.join(cells)}; needed: time_s and exactly "
+            f"one of {', '.join(_SPEED_COLUMNS)}"
+        )
+    if "clutch_open" in cells and "gear" not in cells:
+        raise DataError(f"{path}, line {number}: clutch_open without gear; add the column gear")
+    return cells
+
+
+def _number(path: Path, line: int, column: str, cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        raise DataError(f"{path}, line {line}: {column} is {cell!r}, not a number") from None
+    if not np.isfinite(value):
+        raise DataError(f"{path}, line {line}: {column} is {cell}; a finite number is needed")
+    return value
+
+
+def _check_time_and_speed(path, lines, time_s, speed_mps, column, factor) -> None:
+    steps_s = np.diff(time_s)
+    if (steps_s <= 0).any():
+        k = int(np.argmax(steps_s <= 0)) + 1
+        raise DataError(
+            f"{path}, line {lines[k]}: time {time_s[k]:g} s after {time_s[k - 1]:g} s; "
+            "time must increase from line to line; sort the lines or remove the duplicate"
+        )
+    if (steps_s > _STEP_MAX_S).any():
+        k = int(np.argmax(steps_s > _STEP_MAX_S)) + 1
+        raise DataError(
+            f"{path}, line {lines[k]}: {steps_s[k - 1]:g} s after the line before; allowed: up to "
+            f"{_STEP_MAX_S:g} s; time is in seconds"
+        )
+    if (speed_mps < 0).any() or (speed_mps > _SPEED_MAX_MPS).any():
+        k = int(np.argmax((speed_mps < 0) | (speed_mps > _SPEED_MAX_MPS)))
+        raise DataError(
+            f"{path}, line {lines[k]}: {column} is {speed_mps[k] / factor:g}; allowed: 0 to "
+            f"{_SPEED_MAX_MPS / factor:g}; check the unit in the column's name"
+        )
+    if not (speed_mps > 0).any():
+        raise DataError(f"{path}: the speed is 0 throughout; a cycle must cover some distance")
+    acceleration = np.diff(speed_mps) / steps_s
+    if (np.abs(acceleration) > _ACCELERATION_MAX_MPS2).any():
+        k = int(np.argmax(np.abs(acceleration) > _ACCELERATION_MAX_MPS2)) + 1
+        raise DataError(
+            f"{path}, line {lines[k]}: acceleration {acceleration[k - 1]:.1f} m/s²; allowed: "
+            f"±{_ACCELERATION_MAX_MPS2:g} m/s², more than tyres hold; check the units of time and "
+            "speed, or repair the spike"
+        )
+
+
+def _check_range(path, lines, column, values, low, high) -> None:
+    outside = (values < low) | (values > high)
+    if outside.any():
+        k = int(np.argmax(outside))
+        raise DataError(
+            f"{path}, line {lines[k]}: {column} is {values[k]:g}; allowed: {low:g} to {high:g}"
+        )
+
+
+def _whole_numbers(path, lines, column, values, high) -> NDArray[np.int64]:
+    _check_range(path, lines, column, values, 0, high)
+    if (values != np.round(values)).any():
+        k = int(np.argmax(values != np.round(values)))
+        raise DataError(
+            f"{path}, line {lines[k]}: {column} is {values[k]:g}; a whole number is needed"
+        )
+    return values.astype(np.int64)

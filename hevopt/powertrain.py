@@ -1,0 +1,344 @@
+"""Backward powertrain evaluator: (Architecture, Demand) to ControlTable, as array operations.
+
+Signs: power > 0 flows towards the wheels; battery power > 0 discharges; brake power >= 0.
+
+A control is a joint (couplings.py) and a machine torque. Per step the machine torque runs between what the
+engine's limits and the machine's leave, and the engine delivers the rest; with negative demand the friction
+brakes take what the shafts do not. Always among the levels: both ends (engine at full load and at its lowest
+torque, that is fuel cut or full regeneration), zero torque, battery idle, engine at its best efficiency.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt import battery as battery_model
+from hevopt import engine as engine_model
+from hevopt import machine as machine_model
+from hevopt.architecture import Architecture
+from hevopt.balance import Balance, balance, deliverable_nm, machine_torques
+from hevopt.couplings import Joint, joints
+from hevopt.cycle import Cycle
+from hevopt.demand import Demand, demand_of
+from hevopt.driver import change_down
+from hevopt.errors import DataError, InfeasibleError
+from hevopt.problem import REJECT_WORDS, Control, ControlTable, Problem, Reject, Signals
+from hevopt.transmission import output_torque_nm
+
+Array = NDArray[np.float64]
+Bits = NDArray[np.uint16]
+
+TORQUE_LEVELS = 41
+_TORQUE_TOLERANCE_NM = 1e-6
+_POWER_TOLERANCE_W = 1e-6
+_ROUNDING_W = 1e-9
+_SHORTFALLS_LISTED = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Branch:
+    """All controls of one joint; arrays (time, level), flows also (time, 1)."""
+
+    joint: Joint
+    labels: tuple[str, ...]
+    fuel_kg: Array
+    nox_kg: Array
+    battery_power_w: Array
+    reject: Bits
+    flows: dict[str, Array]
+
+
+def build_problem(
+    architecture: Architecture,
+    cycle: Cycle,
+    *,
+    levels: int = TORQUE_LEVELS,
+    nox_weight: float = 0.0,
+    soc_start: float | None = None,
+    allow_shortfall: bool = False,
+) -> Problem:
+    """The energy-management problem of a car on a cycle, charge at the end no less than at the start.
+
+    levels: machine torques per step and joint; nox_weight: kg of fuel that a kg of NOx counts.
+    Raises InfeasibleError, listing steps and missing torque, where no control follows the cycle; with
+    `allow_shortfall` such steps are driven with what the powertrain can give, and marked in the table.
+    """
+    demand = demand_of(cycle, architecture.vehicle, architecture.gearbox)
+    if cycle.gear is None:
+        demand = change_down(
+            demand, architecture.vehicle, architecture.engine, architecture.gearbox
+        )
+    table = build_table(architecture, demand, levels=levels, allow_shortfall=allow_shortfall)
+    start = architecture.soc_start if soc_start is None else soc_start
+    return Problem(table, architecture.battery, start, start, 0, nox_weight)
+
+
+def build_table(
+    architecture: Architecture,
+    demand: Demand,
+    *,
+    levels: int = TORQUE_LEVELS,
+    allow_shortfall: bool = False,
+) -> ControlTable:
+    """Every control at every step, (time, control)."""
+    if not 2 <= levels <= 2001:
+        raise DataError(f"torque levels {levels}; allowed: 2 to 2001")
+    branches = _branches(architecture, demand, levels)
+    stuck = _stuck(branches)
+    missing = np.zeros(len(demand.time_s))
+    if stuck.any():
+        limits = [deliverable_nm(architecture, demand, branch.joint) for branch in branches]
+        short = demand.wheel_torque_nm - np.max(limits, axis=0)
+        missing = np.where(stuck, np.maximum(short, 0.0), 0.0)
+        if allow_shortfall:
+            demand = demand.with_torque(demand.wheel_torque_nm - missing)
+            branches = _branches(architecture, demand, levels)
+            stuck = _stuck(branches)
+        if stuck.any():
+            raise InfeasibleError(
+                _shortfall_message(architecture, demand, stuck, missing, branches)
+            )
+    return _assemble(architecture, demand, branches, missing)
+
+
+def _branches(architecture: Architecture, demand: Demand, levels: int) -> list[_Branch]:
+    branches = []
+    may_stop = architecture.functions & {"start_stop", "power_management"}
+    for joint in joints(architecture, demand):
+        if joint.engine_on or may_stop:
+            torque, labels, spread = machine_torques(architecture, demand, joint, levels)
+            torques = balance(architecture, demand, joint, torque)
+            branch = _branch(architecture, demand, joint, torques, labels)
+            branch.reject[~spread, 1:] |= np.uint16(Reject.DUPLICATE)
+            branches.append(branch)
+    return branches
+
+
+def _stuck(branches: list[_Branch]) -> NDArray[np.bool_]:
+    return ~np.any([(branch.reject == 0).any(axis=1) for branch in branches], axis=0)
+
+
+def _branch(
+    architecture: Architecture,
+    demand: Demand,
+    joint: Joint,
+    torques: Balance,
+    labels: tuple[str, ...],
+) -> _Branch:
+    engine, step_s = architecture.engine, demand.step_s[:, None]
+    fuel_kgps = nox_kgps = np.zeros_like(torques.machine)
+    if joint.engine_on:
+        speed = joint.engine_speed_radps[:, None]
+        fuel_kgps = engine_model.fuel_kgps(engine, torques.engine, speed)
+        nox_kgps = engine_model.nox_kgps(engine, torques.engine, speed)
+        nox_kgps = np.where(fuel_kgps == 0, 0.0, nox_kgps)
+    off_map = np.isnan(fuel_kgps) | np.isnan(nox_kgps)
+    fuel_kgps, nox_kgps = np.nan_to_num(fuel_kgps), np.nan_to_num(nox_kgps)
+    flows = _flows(architecture, demand, joint, torques, fuel_kgps)
+    battery_power_w = flows["machine_electric_w"] + architecture.vehicle.auxiliary_power_w
+    # What an alternator that follows its load leaves to the battery is rounding, not charge.
+    battery_power_w = np.where(np.abs(battery_power_w) < _ROUNDING_W, 0.0, battery_power_w)
+    reject = (
+        _bits(Reject.ENGINE_MAP, off_map)
+        | _limit_rejects(architecture, demand, joint, torques)
+        | _bits(
+            Reject.BATTERY_LIMIT,
+            ~battery_model.within_limits(architecture.battery, battery_power_w),
+        )
+        | _function_rejects(architecture, demand, joint, torques, fuel_kgps, battery_power_w)
+    )
+    return _Branch(
+        joint, labels, fuel_kgps * step_s, nox_kgps * step_s, battery_power_w, reject, flows
+    )
+
+
+def _flows(
+    architecture: Architecture, demand: Demand, joint: Joint, torques: Balance, fuel_kgps: Array
+) -> dict[str, Array]:
+    """Powers, each loss by its own law and not as a difference, so that their balance is a check."""
+    engine_speed = joint.engine_speed_radps[:, None]
+    machine_speed = joint.machine_speed_radps[:, None]
+    wheel_speed = demand.wheel_speed_radps[:, None]
+    ratio, efficiency = joint.gear_ratio[:, None], joint.gear_efficiency[:, None]
+    own = ~(joint.upstream | joint.shared)[:, None]
+    fuel_power = fuel_kgps * architecture.engine.heating_value_jpkg
+    machine_power = torques.machine * machine_speed
+    machine_loss = machine_model.loss_w(architecture.machine, torques.machine, machine_speed)
+    engine_inertia = architecture.engine.inertia_kgm2 * joint.engine_accel_radps2[:, None]
+    machine_inertia = architecture.machine.inertia_kgm2 * joint.machine_accel_radps2[:, None]
+    own_loss = _gear_loss_w(torques.machine_net * machine_speed, joint.machine_efficiency[:, None])
+    return {
+        "engine_torque_nm": torques.engine,
+        "engine_speed_radps": engine_speed,
+        "machine_torque_nm": torques.machine,
+        "machine_speed_radps": machine_speed,
+        "fuel_power_w": fuel_power,
+        "engine_loss_w": fuel_power - torques.engine * engine_speed,
+        "engine_inertia_w": engine_inertia * engine_speed,
+        "machine_electric_w": machine_power + machine_loss,
+        "machine_loss_w": machine_loss,
+        "machine_inertia_w": machine_inertia * machine_speed,
+        "machine_upstream": joint.upstream[:, None].astype(float),
+        "machine_shared": joint.shared[:, None].astype(float),
+        "clutch_in_w": torques.clutch * engine_speed,
+        "clutch_loss_w": torques.clutch * joint.slip_radps[:, None],
+        "gearbox_out_w": output_torque_nm(torques.gearbox_in, ratio, efficiency) * wheel_speed,
+        "gearbox_loss_w": _gear_loss_w(torques.gearbox_in * ratio * wheel_speed, efficiency),
+        "machine_gear_out_w": torques.wheel_own * wheel_speed,
+        "machine_gear_loss_w": np.where(own, own_loss, 0.0),
+        "brake_power_w": torques.brake * wheel_speed,
+        "wheel_power_w": demand.wheel_power_w[:, None],
+        "auxiliary_power_w": np.full((1, 1), architecture.vehicle.auxiliary_power_w),
+    }
+
+
+def _gear_loss_w(input_w: Array, efficiency: Array) -> Array:
+    return np.where(input_w > 0, input_w * (1 - efficiency), input_w * (1 - 1 / efficiency))
+
+
+def _limit_rejects(
+    architecture: Architecture, demand: Demand, joint: Joint, torques: Balance
+) -> Bits:
+    """Limits of engine, machine and shafts, whatever the architecture may do."""
+    tolerance = _TORQUE_TOLERANCE_NM
+    engine, machine = architecture.engine, architecture.machine
+    engine_speed, speed = joint.engine_speed_radps[:, None], joint.machine_speed_radps[:, None]
+    full = engine_model.full_load_torque_nm(engine, engine_speed) if joint.engine_on else 0.0
+    limit = machine_model.torque_limit_nm(machine, speed)
+    torque = np.abs(torques.machine)
+    wanted = demand.wheel_torque_nm[:, None]
+    unmet = np.where(wanted > 0, np.abs(torques.brake), -torques.brake) > 10 * tolerance
+    return (
+        _bits(Reject.ENGINE_TORQUE, torques.engine > full + tolerance)
+        | _bits(Reject.ENGINE_TORQUE, torques.engine < torques.least_engine - tolerance)
+        | _bits(Reject.ENGINE_SPEED, engine_speed > engine.speed_max_radps * (1 + 1e-12))
+        | _bits(Reject.MACHINE_LIMIT, torque > limit + tolerance)
+        | _bits(Reject.MACHINE_SPEED, joint.connected[:, None] & (speed > machine.speed_max_radps))
+        | _bits(Reject.NO_PATH, ~joint.connected[:, None] & (torque > tolerance))
+        | _bits(Reject.NO_PATH, joint.slipping[:, None] & (torques.clutch < -tolerance))
+        | _bits(Reject.NO_PATH, ~joint.possible[:, None] | unmet)
+    )
+
+
+def _function_rejects(
+    architecture: Architecture,
+    demand: Demand,
+    joint: Joint,
+    torques: Balance,
+    fuel_kgps: Array,
+    battery_power_w: Array,
+) -> Bits:
+    """Table 1: what the architecture's functions leave of the physically possible.
+
+    start_stop            engine at rest while the car stands
+    power_management      engine at rest or without fuel while the machine drives; assistance
+    nox_cut               assistance by the machine while the engine drives
+    e_boost               assistance only where the engine alone falls short
+    regenerative_braking  charging while the car is braked
+    Charging by the engine while it runs needs no function: any alternator does that.
+    """
+    has = architecture.functions.__contains__
+    wanted = demand.wheel_torque_nm[:, None]
+    standing = demand.wheel_speed_radps[:, None] == 0
+    banned = np.zeros(torques.machine.shape, dtype=bool)
+    if not joint.engine_on:
+        banned |= standing & (not has("start_stop"))
+        banned |= ~standing & (not has("power_management"))
+    elif not has("power_management"):
+        motoring = torques.machine > _TORQUE_TOLERANCE_NM
+        banned |= motoring & (fuel_kgps == 0)
+        if not has("nox_cut"):
+            alone = balance(architecture, demand, joint, np.zeros((len(wanted), 1))).engine
+            speed = joint.engine_speed_radps[:, None]
+            full = engine_model.full_load_torque_nm(architecture.engine, speed)
+            banned |= motoring & ~(has("e_boost") & (alone > full))
+    if not has("regenerative_braking"):
+        banned |= (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)
+    return _bits(Reject.FUNCTION, banned)
+
+
+def _bits(reason: Reject, where: Array) -> Bits:
+    return np.where(where, np.uint16(reason), np.uint16(0))
+
+
+def _assemble(
+    architecture: Architecture, demand: Demand, branches: list[_Branch], missing: Array
+) -> ControlTable:
+    modes, switch_fuel_kg = _modes(architecture, branches)
+    widths = [len(branch.labels) for branch in branches]
+    flows = {
+        name: _joined([branch.flows[name] for branch in branches], widths, len(demand.time_s))
+        for name in branches[0].flows
+    }
+    controls = tuple(
+        Control(branch.joint.engine_on, branch.joint.machine_gear, label)
+        for branch in branches
+        for label in branch.labels
+    )
+    return ControlTable(
+        time_s=demand.time_s,
+        step_s=demand.step_s,
+        fuel_kg=np.hstack([branch.fuel_kg for branch in branches]),
+        nox_kg=np.hstack([branch.nox_kg for branch in branches]),
+        battery_power_w=np.hstack([branch.battery_power_w for branch in branches]),
+        reject=np.hstack([branch.reject for branch in branches]),
+        mode=np.repeat(modes, widths),
+        switch_fuel_kg=switch_fuel_kg,
+        switch_allowed=np.ones(switch_fuel_kg.shape, dtype=bool),
+        controls=controls,
+        signals=Signals(demand.speed_mps, demand.wheel_power_w, demand.gear, demand.clutch_open),
+        flows=flows,
+        missing_torque_nm=missing,
+    )
+
+
+def _joined(parts: list[Array], widths: list[int], steps: int) -> Array:
+    return np.hstack(
+        [np.broadcast_to(part, (steps, w)) for part, w in zip(parts, widths, strict=True)]
+    )
+
+
+def _modes(architecture: Architecture, branches: list[_Branch]) -> tuple[NDArray[np.int64], Array]:
+    """Mode of every branch, and the fuel of going from one mode to another, (mode, mode).
+
+    Machine gears are modes of their own only where changing them costs something.
+    """
+    shift_kg = architecture.coupling.machine_shift_fuel_kg
+    keys = [(b.joint.engine_on, b.joint.machine_gear if shift_kg else 0) for b in branches]
+    distinct = list(dict.fromkeys(keys))
+    switch = np.zeros((len(distinct), len(distinct)))
+    for i, (was_on, from_gear) in enumerate(distinct):
+        for j, (is_on, to_gear) in enumerate(distinct):
+            start = architecture.engine.start_fuel_kg if is_on and not was_on else 0.0
+            switch[i, j] = start + (shift_kg if from_gear != to_gear else 0.0)
+    return np.array([distinct.index(key) for key in keys]), switch
+
+
+def _shortfall_message(
+    architecture: Architecture,
+    demand: Demand,
+    stuck: NDArray[np.bool_],
+    missing: Array,
+    branches: list[_Branch],
+) -> str:
+    reject = np.hstack([branch.reject for branch in branches])
+    steps = np.flatnonzero(stuck)
+    lines = []
+    for k in steps[:_SHORTFALLS_LISTED]:
+        counts = {word: int(np.sum(reject[k] & bit > 0)) for bit, word in REJECT_WORDS.items()}
+        reasons = ", ".join(f"{word} {count}" for word, count in counts.items() if count)
+        lines.append(
+            f"t = {demand.time_s[k]:g} s: {demand.speed_mps[k] * 3.6:.1f} km/h, gear "
+            f"{demand.gear[k]}, {demand.wheel_power_w[k] / 1e3:.1f} kW at the wheels, "
+            f"{missing[k]:.0f} Nm missing at the wheels "
+            f"(of {reject.shape[1]} controls rejected: {reasons})"
+        )
+    more = len(steps) - len(lines)
+    lines += [f"and {more} more"] if more else []
+    return (
+        f"architecture {architecture.name} cannot follow the cycle at {len(steps)} of "
+        f"{len(stuck)} steps:\n  " + "\n  ".join(lines) + "\n  choose an easier cycle, a stronger "
+        "engine (full_load in its file) or lower gears, or pass --allow-shortfall to drive on with "
+        "what there is"
+    )

@@ -1,0 +1,246 @@
+"""The waist: what a strategy sees of a car and a cycle, and what it gives back.
+
+The powertrain is evaluated once for every step and every control; after that no strategy needs a car.
+Axis order is (time, control). Power > 0 flows towards the wheels; battery power > 0 discharges.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntFlag
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.battery import Battery, energy_j
+from hevopt.errors import DataError
+
+Array = NDArray[np.float64]
+
+
+class Reject(IntFlag):
+    """Why a control cannot be used at a step."""
+
+    ENGINE_TORQUE = 1
+    ENGINE_SPEED = 2
+    ENGINE_MAP = 4
+    MACHINE_LIMIT = 8
+    MACHINE_SPEED = 16
+    BATTERY_LIMIT = 32
+    NO_PATH = 64
+    FUNCTION = 128
+    DUPLICATE = 256
+
+
+REJECT_WORDS: dict[Reject, str] = {
+    Reject.ENGINE_TORQUE: "engine torque",
+    Reject.ENGINE_SPEED: "engine speed",
+    Reject.ENGINE_MAP: "outside the engine map",
+    Reject.MACHINE_LIMIT: "machine torque or power",
+    Reject.MACHINE_SPEED: "machine speed",
+    Reject.BATTERY_LIMIT: "battery limit",
+    Reject.NO_PATH: "torque does not reach the wheels",
+    Reject.FUNCTION: "function not in the architecture",
+    Reject.DUPLICATE: "same as another control",
+}
+
+
+class Control(NamedTuple):
+    """Label of a control: engine turning or not, the machine's gear (0 where it has none), torque level."""
+
+    engine_on: bool
+    machine_gear: int
+    level: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signals:
+    """What a rule may look at, all (time,): the driver's view of the step."""
+
+    speed_mps: Array
+    wheel_power_w: Array
+    gear: NDArray[np.int64]
+    clutch_open: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlTable:
+    """Every control at every step.
+
+    time_s, step_s: (time,) start and length of the steps
+    fuel_kg, nox_kg, battery_power_w: (time, control) per step; finite also where rejected
+    reject: (time, control) bits of Reject, 0 = feasible
+    mode: (control,) discrete state the control leads to
+    switch_fuel_kg, switch_allowed: (mode, mode) [from, to]
+    flows: name -> (time, control) powers, speeds and torques for the energy balance; may be empty
+    missing_torque_nm: (time,) wheel torque that no control could deliver and that was left undriven
+    """
+
+    time_s: Array
+    step_s: Array
+    fuel_kg: Array
+    nox_kg: Array
+    battery_power_w: Array
+    reject: NDArray[np.uint16]
+    mode: NDArray[np.int64]
+    switch_fuel_kg: Array
+    switch_allowed: NDArray[np.bool_]
+    controls: tuple[Control, ...]
+    signals: Signals | None = None
+    flows: Mapping[str, Array] = field(default_factory=dict)
+    missing_torque_nm: Array | None = None
+
+    def __post_init__(self) -> None:
+        self._check_shapes()
+        self._check_values()
+        for name in ("time_s", "step_s", "fuel_kg", "nox_kg", "battery_power_w", "reject", "mode"):
+            getattr(self, name).flags.writeable = False
+
+    def _check_shapes(self) -> None:
+        steps, controls = self.fuel_kg.shape
+        modes = len(self.switch_fuel_kg)
+        expected = {
+            "time_s": (steps,),
+            "step_s": (steps,),
+            "nox_kg": (steps, controls),
+            "battery_power_w": (steps, controls),
+            "reject": (steps, controls),
+            "mode": (controls,),
+            "switch_fuel_kg": (modes, modes),
+            "switch_allowed": (modes, modes),
+        }
+        for name, shape in expected.items():
+            if getattr(self, name).shape != shape:
+                raise DataError(
+                    f"control table: {name} has shape {getattr(self, name).shape}, expected {shape}"
+                    " (time, control) or (mode, mode)"
+                )
+        if len(self.controls) != controls:
+            raise DataError(f"control table: {len(self.controls)} labels for {controls} controls")
+
+    def _check_values(self) -> None:
+        for name in ("time_s", "step_s", "fuel_kg", "nox_kg", "battery_power_w", "switch_fuel_kg"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise DataError(
+                    f"control table: {name} holds NaN or infinite values; give any finite value "
+                    "and mark the entry in reject or switch_allowed"
+                )
+        if (self.step_s <= 0).any():
+            raise DataError("control table: every step_s must be > 0")
+        if self.mode.min() < 0 or self.mode.max() >= len(self.switch_fuel_kg):
+            raise DataError(
+                f"control table: mode runs from {self.mode.min()} to {self.mode.max()}; allowed: 0 "
+                f"to {len(self.switch_fuel_kg) - 1}, the size of switch_fuel_kg"
+            )
+        if (self.switch_fuel_kg < 0).any():
+            raise DataError("control table: switch_fuel_kg must be >= 0")
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """(time, control) True where the control can be used."""
+        return self.reject == 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A control table, a battery and what is asked: least fuel + nox_weight x NOx, with enough charge left.
+
+    soc_end_min: state of charge that must at least be left at the end
+    start_mode: mode before the first step
+    nox_weight: kg of fuel that a kg of NOx counts
+    """
+
+    table: ControlTable
+    battery: Battery
+    soc_start: float
+    soc_end_min: float
+    start_mode: int = 0
+    nox_weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        low, high = self.battery.soc_min, self.battery.soc_max
+        for name in ("soc_start", "soc_end_min"):
+            if not low <= getattr(self, name) <= high:
+                raise DataError(
+                    f"{name} {getattr(self, name):g} lies outside the SOC window; allowed: "
+                    f"{low:g} to {high:g}"
+                )
+        if not (np.isfinite(self.nox_weight) and 0 <= self.nox_weight <= 1e6):
+            raise DataError(f"nox_weight {self.nox_weight}; allowed: 0 to 1e6 kg fuel per kg NOx")
+        if not 0 <= self.start_mode < len(self.table.switch_fuel_kg):
+            raise DataError(
+                f"start_mode {self.start_mode}; allowed: 0 to {len(self.table.switch_fuel_kg) - 1}"
+            )
+
+    @property
+    def cost_kg(self) -> Array:
+        """(time, control) what a step counts: fuel plus weighted NOx."""
+        if self.nox_weight == 0:
+            return self.table.fuel_kg
+        return self.table.fuel_kg + self.nox_weight * self.table.nox_kg
+
+    @property
+    def start_j(self) -> float:
+        """Stored energy before the first step."""
+        return float(energy_j(self.battery, self.soc_start))
+
+    @property
+    def end_min_j(self) -> float:
+        """Stored energy that must at least be left."""
+        return float(energy_j(self.battery, self.soc_end_min))
+
+    @property
+    def window_j(self) -> tuple[float, float]:
+        """Stored energy at the ends of the SOC window."""
+        low, high = energy_j(self.battery, np.array([self.battery.soc_min, self.battery.soc_max]))
+        return float(low), float(high)
+
+    def with_nox_weight(self, nox_weight: float) -> "Problem":
+        """The same problem with another objective."""
+        return replace(self, nox_weight=nox_weight)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A strategy's proposal. control: (time,) indices into the table; notes: what the solver can tell."""
+
+    control: NDArray[np.int64]
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """What a plan does, added up by simulate.
+
+    energy_j, soc: (time + 1,), stored energy and state of charge at the steps' ends
+    mode, fuel_kg, nox_kg, battery_power_w: (time,); fuel includes the cost of switching in its step
+    flows: name -> (time,) powers, speeds, torques and losses
+    residuals: component -> (time,) power balance, in W, 0 up to rounding
+    """
+
+    control: NDArray[np.int64]
+    energy_j: Array
+    soc: Array
+    mode: NDArray[np.int64]
+    fuel_kg: Array
+    switch_fuel_kg: Array
+    nox_kg: Array
+    battery_power_w: Array
+    cost_kg: float
+    flows: Mapping[str, Array]
+    residuals: Mapping[str, Array]
+
+    @property
+    def total_fuel_kg(self) -> float:
+        """Fuel burnt, starts and shifts included."""
+        return float(np.sum(self.fuel_kg))
+
+    @property
+    def total_nox_kg(self) -> float:
+        """NOx emitted."""
+        return float(np.sum(self.nox_kg))
+
+    @property
+    def end_j(self) -> float:
+        """Stored energy left."""
+        return float(self.energy_j[-1])

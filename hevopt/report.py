@@ -1,0 +1,242 @@
+"""Everything hevopt writes: tables for the terminal, JSON, trajectories as CSV, control tables as .npz."""
+
+import csv
+import io
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from hevopt.errors import DataError
+from hevopt.problem import Plan, Problem, Trajectory
+from hevopt.published import CYCLE, published_beside
+from hevopt.study import Comparison, Row
+
+TABLE_README = """hevopt control table. Arrays are (time, control) unless said otherwise.
+fuel_kg, nox_kg      burnt and emitted in the step; finite also where not feasible
+battery_power_w      at the terminals during the step, > 0 discharges
+feasible, reject     True where the control can be used; reject: bits saying why not, 0 = feasible
+mode                 (control,) discrete state the control leads to
+switch_fuel_kg       (mode, mode) [from, to] fuel of going from one mode to another, start_mode before step 0
+switch_allowed       (mode, mode) [from, to]
+controls             (control,) labels: engine on or off, machine gear, torque level
+time_s, step_s       (time,) start and length of the steps
+soc_start, soc_end_min, soc_min, soc_max    state of charge: start, least at the end, window
+nox_weight           kg of fuel that a kg of NOx counts; objective = sum(fuel + switch_fuel + nox_weight nox)
+battery_soc, battery_open_circuit_v, battery_discharge_ohm, battery_charge_ohm    (point,) curves of the pack,
+                     linear between points; battery_capacity_as; battery_coulombic_efficiency
+Step of the battery, with stored energy E as the state:
+  dE/dSOC = battery_capacity_as * Uoc(SOC), E = 0 at battery_soc[0]; R of discharge where P > 0, else of charge
+  I = 2 P / (Uoc + sqrt(Uoc^2 - 4 R P)) at the SOC before the step
+  E_next = E - step_s * Uoc * I * (battery_coulombic_efficiency where I < 0, else 1)
+"""
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """The rows as a table for the terminal."""
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        title=f"cycle {comparison.cycle}",
+        title_justify="left",
+        collapse_padding=True,
+        pad_edge=False,
+    )
+    for name in ("car", "strategy"):
+        table.add_column(name, no_wrap=True)
+    for head in (
+        "fuel\nl/100km", "vs ref\n%", "CO2\ng/km", "NOx\nmg/km", "vs ref\n%", "ΔSOC", "ΔE/fuel\n%",
+        "corrected\nl/100km", "starts", "bound\nl/100km", "gap\n%",
+    ):  # fmt: skip
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("proof", no_wrap=True)
+    table.add_column("s", justify="right", no_wrap=True)
+    table.add_column("status")
+    previous = None
+    for row in comparison.rows:
+        if previous not in (None, row.architecture):
+            table.add_section()
+        previous = row.architecture
+        table.add_row(*_cells(row))
+    return table
+
+
+def _cells(row: Row) -> list[str]:
+    def number(value: float | None, form: str) -> str:
+        return "-" if value is None else format(0.0 if abs(value) < 5e-7 else value, form)
+
+    change = None if row.soc_end is None else row.soc_end - row.soc_start
+    return [
+        row.architecture,
+        row.strategy,
+        number(row.fuel_l_per_100km, ".3f"),
+        number(row.delta_fuel_percent, "+.1f"),
+        number(row.co2_g_per_km, ".1f"),
+        number(row.nox_mg_per_km, ".0f"),
+        number(row.delta_nox_percent, "+.1f"),
+        number(change, "+.4f"),
+        number(row.delta_energy_percent, "+.2f"),
+        number(row.fuel_corrected_l_per_100km, ".3f"),
+        "-" if row.engine_starts is None else str(row.engine_starts),
+        number(row.bound_l_per_100km, ".3f"),
+        number(row.gap_percent, ".3f"),
+        row.certificate or "-",
+        number(row.solve_s, ".2f"),
+        row.status,
+    ]
+
+
+def comparison_notes(comparison: Comparison) -> str:
+    """What the columns mean, below the table."""
+    objective = "fuel"
+    if comparison.nox_weight:
+        objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
+    return (
+        f"vs ref: against {comparison.reference}. corrected: fuel less what the end charge is worth "
+        "(multiplier of the dual).\n"
+        f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
+        "gap: how far the row is above it.\n"
+        "proof: one multiplier = one price on charge; costate prices = one per step, from the "
+        "costate equation."
+    )
+
+
+def published_table(comparison: Comparison) -> Table | None:
+    """Published figures beside ours; None on other cycles or without the cases."""
+    statements = published_beside(comparison.rows) if comparison.cycle == CYCLE else []
+    if not statements:
+        return None
+    title = "published study (Millo, Rolando, Andreata 2011) beside ours, nothing tuned"
+    table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
+    for head in ("change", "published", "ours", "what differs"):
+        table.add_column(head, justify="right" if head == "ours" else "left")
+    for statement in statements:
+        table.add_row(*statement)
+    return table
+
+
+def comparison_json(comparison: Comparison) -> str:
+    """One object {"cycle", "rows"}; null where a figure does not exist."""
+    rows = [row.as_dict() for row in comparison.rows]
+    return json.dumps({"cycle": comparison.cycle, "rows": rows}, indent=1, allow_nan=False)
+
+
+def calibration_table(plan: Plan) -> Table | None:
+    """The calibration curve of a rule-based strategy; None for the others."""
+    members: list[Mapping[str, Any]] = plan.notes.get("calibration", [])
+    if len(members) < 2:
+        return None
+    title = "calibration: * the member taken"
+    table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
+    capped = "nox_cap_kgps" in members[0]
+    heads = ["electric below kW", *(["NOx cap mg/s"] if capped else []), "cost kg", "corrected kg",
+             "NOx g", "end surplus kJ", "neutral", ""]  # fmt: skip
+    for head in heads:
+        table.add_column(head, justify="right")
+    for n, member in enumerate(members):
+        cap = [f"{member['nox_cap_kgps'] * 1e6:.2f}"] if capped else []
+        table.add_row(
+            f"{member['threshold_w'] / 1e3:.2f}", *cap,
+            f"{member['cost_kg']:.5f}", f"{member['corrected_kg']:.5f}",
+            f"{member['nox_kg'] * 1e3:.3f}", f"{member['surplus_j'] / 1e3:+.1f}",
+            "yes" if member["neutral"] else "no", "*" if n == plan.notes["chosen"] else "",
+        )  # fmt: skip
+    return table
+
+
+def write_trajectory(path: Path, problem: Problem, trajectory: Trajectory) -> None:
+    """A CSV line per step: inputs, controls, every power and loss, units in the column names."""
+    columns = trajectory_columns(problem, trajectory)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for values in zip(*columns.values(), strict=True):
+        writer.writerow([_plain(value) for value in values])
+    write_whole(path, text.getvalue().encode())
+
+
+def trajectory_columns(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
+    """Column name to (time,) values of a trajectory."""
+    table = problem.table
+    labels = [table.controls[c] for c in trajectory.control]
+    columns: dict[str, Any] = {"time_s": table.time_s, "step_s": table.step_s}
+    if table.signals is not None:
+        columns["speed_mps"] = table.signals.speed_mps
+        columns["gear"] = table.signals.gear
+        columns["clutch_open"] = table.signals.clutch_open.astype(int)
+    columns |= {
+        "engine_on": [int(label.engine_on) for label in labels],
+        "machine_gear": [label.machine_gear for label in labels],
+        "level": [label.level for label in labels],
+        "soc": trajectory.soc[:-1],
+        "soc_after": trajectory.soc[1:],
+        "energy_j": trajectory.energy_j[:-1],
+        "fuel_kg": trajectory.fuel_kg,
+        "switch_fuel_kg": trajectory.switch_fuel_kg,
+        "nox_kg": trajectory.nox_kg,
+        "battery_power_w": trajectory.battery_power_w,
+    }
+    columns |= trajectory.flows
+    if table.missing_torque_nm is not None:
+        columns["missing_torque_nm"] = table.missing_torque_nm
+    residuals = {
+        f"residual_{name.replace(' ', '_')}_w": r for name, r in trajectory.residuals.items()
+    }
+    return columns | residuals
+
+
+def write_table(path: Path, problem: Problem) -> None:
+    """The problem as .npz arrays, enough for another solver to repeat ours; documented in its README entry."""
+    table, pack = problem.table, problem.battery
+    labels = [
+        f"engine {'on' if c.engine_on else 'off'}, machine gear {c.machine_gear}, {c.level}"
+        for c in table.controls
+    ]
+    contents = io.BytesIO()
+    np.savez_compressed(
+        contents,
+        README=np.array(TABLE_README),
+        time_s=table.time_s, step_s=table.step_s, fuel_kg=table.fuel_kg, nox_kg=table.nox_kg,
+        battery_power_w=table.battery_power_w, feasible=table.feasible, reject=table.reject,
+        mode=table.mode, switch_fuel_kg=table.switch_fuel_kg, switch_allowed=table.switch_allowed,
+        controls=np.array(labels), start_mode=problem.start_mode, nox_weight=problem.nox_weight,
+        soc_start=problem.soc_start, soc_end_min=problem.soc_end_min, soc_min=pack.soc_min,
+        soc_max=pack.soc_max, battery_soc=pack.soc, battery_open_circuit_v=pack.open_circuit_v,
+        battery_discharge_ohm=pack.discharge_ohm, battery_charge_ohm=pack.charge_ohm,
+        battery_capacity_as=pack.capacity_as,
+        battery_coulombic_efficiency=pack.coulombic_efficiency,
+    )  # fmt: skip
+    write_whole(path, contents.getvalue())
+
+
+def write_whole(path: Path, contents: bytes) -> None:
+    """Write a file at once: killed in the middle, the old one is whole."""
+    temporary = None
+    try:
+        with tempfile.NamedTemporaryFile(
+            dir=path.parent, prefix=f".{path.name}.", delete=False
+        ) as f:
+            temporary = Path(f.name)
+            f.write(contents)
+            f.flush()
+            os.fsync(f.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(path)
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be written ({error.strerror}); choose another place"
+        ) from None
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    return repr(float(value)) if isinstance(value, float | np.floating) else value

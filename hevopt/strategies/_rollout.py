@@ -1,0 +1,132 @@
+"""Rollout: the path that follows a value function and can always still reach the end.
+
+Shared by every strategy that looks ahead. The value function is linear between the nodes of an energy grid;
+two nodes make it a plain price on stored energy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt import battery as battery_model
+from hevopt.choices import Choices
+from hevopt.errors import InfeasibleError, SolverError
+from hevopt.problem import Problem
+from hevopt.strategies import _rollout_kernels as kernels
+
+Array = NDArray[np.float64]
+# Moves per step before the search for a way round dead ends is given up.
+_MOVES_PER_STEP = 500
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """Stored energy, (time + 1, mode), between which the end can be reached; least > greatest: nowhere."""
+
+    least_j: Array
+    greatest_j: Array
+
+
+def reach_of(problem: Problem, choices: Choices, end_min_j: float) -> Reach:
+    """From where an end charge can be reached; InfeasibleError where the start is not among it."""
+    low, high = problem.window_j
+    reach = Reach(
+        *kernels.reachable(
+            choices.first, choices.power_w, choices.step_s, choices.switch_allowed,
+            low, high, end_min_j, problem.battery.arrays,
+        )
+    )  # fmt: skip
+    mode, slack = problem.start_mode, 1e-12 * high
+    least, greatest = reach.least_j[0, mode], reach.greatest_j[0, mode]
+    if not least - slack <= problem.start_j <= greatest + slack:
+        raise InfeasibleError(_why_unreachable(problem, choices, end_min_j))
+    return reach
+
+
+def roll(
+    problem: Problem,
+    choices: Choices,
+    reach: Reach,
+    value_kg: Array,
+    grid_low_j: Array,
+    cell_j: float,
+) -> NDArray[np.int64]:
+    """Entries (time,) that follow a value function (time + 1, mode, node) at energies grid_low_j + cell_j node.
+
+    grid_low_j: (time + 1,)
+    """
+    budget = _MOVES_PER_STEP * choices.steps + 10_000
+    path, steps, furthest, moves = kernels.rollout(
+        choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
+        choices.switch_allowed, problem.start_mode, problem.start_j, value_kg, grid_low_j, cell_j,
+        reach.least_j, reach.greatest_j, problem.battery.arrays, budget,
+    )  # fmt: skip
+    if steps == choices.steps:
+        return path
+    where = f"step {furthest} (t = {problem.table.time_s[furthest]:g} s)"
+    if moves < budget:
+        raise InfeasibleError(
+            f"no path reaches the end: every way stops at {where} at the latest; widen the SOC window, "
+            "lower soc_end_min or allow more switches"
+        )
+    raise SolverError(
+        f"rollout: no way found past {where} within {budget} moves; use a finer energy grid"
+    )
+
+
+def _why_unreachable(problem: Problem, choices: Choices, end_min_j: float) -> str:
+    """The first step at which nothing is left, and why, going forward from the start."""
+    low, high = problem.window_j
+    bottom = np.full(choices.modes, np.inf)
+    top = np.full(choices.modes, -np.inf)
+    bottom[problem.start_mode] = top[problem.start_mode] = problem.start_j
+    for k in range(choices.steps):
+        moved = _advance(problem, choices, k, bottom, top)
+        if not (moved[0] <= moved[1]).any():
+            return _reason_at(problem, choices, k)
+        bottom, top = np.maximum(moved[0], low), np.minimum(moved[1], high)
+        gone = bottom > top
+        bottom, top = np.where(gone, np.inf, bottom), np.where(gone, -np.inf, top)
+        if gone.all():
+            return _reason_at(problem, choices, k)
+    best = float(battery_model.soc(problem.battery, top.max()))
+    wanted = float(battery_model.soc(problem.battery, end_min_j))
+    return (
+        f"the end charge cannot be reached: SOC {wanted:.4f} is asked, {best:.4f} is the most any plan "
+        f"reaches at the last step {choices.steps - 1}; lower soc_end_min or give the machine more power"
+    )
+
+
+def _advance(
+    problem: Problem, choices: Choices, k: int, bottom: Array, top: Array
+) -> tuple[Array, Array]:
+    """Least and greatest energy per mode after step k."""
+    new_bottom, new_top = np.full_like(bottom, np.inf), np.full_like(top, -np.inf)
+    for n in range(choices.modes):
+        entries = slice(choices.first[k, n], choices.first[k, n + 1])
+        power = choices.power_w[entries]
+        origins = np.flatnonzero(choices.switch_allowed[:, n] & np.isfinite(bottom))
+        if not len(power) or not len(origins):
+            continue
+        for energy, pick in (
+            (bottom[origins].min(), power.max()),
+            (top[origins].max(), power.min()),
+        ):
+            drain = kernels.chemical_power_at(pick, energy, problem.battery.arrays)
+            after = energy - choices.step_s[k] * drain
+            new_bottom[n], new_top[n] = min(new_bottom[n], after), max(new_top[n], after)
+    return new_bottom, new_top
+
+
+def _reason_at(problem: Problem, choices: Choices, k: int) -> str:
+    place = f"nothing is reachable after step {k} (t = {problem.table.time_s[k]:g} s)"
+    if choices.first[k, 0] == choices.first[k, -1]:
+        return f"{place}: every control is rejected there; see the table's reject"
+    entries = slice(choices.first[k, 0], choices.first[k, -1])
+    power = choices.power_w[entries]
+    return (
+        f"{place}: the allowed controls leave the SOC window {problem.battery.soc_min:g} to "
+        f"{problem.battery.soc_max:g} or need a forbidden switch (battery power {power.min():.0f} to "
+        f"{power.max():.0f} W); widen the window, or allow the switch"
+    )

@@ -1,0 +1,213 @@
+"""Compiled reachability, backward recursion and rollout, all on stored energy with the true battery step."""
+
+import numpy as np
+from numba import njit
+
+from hevopt._battery_kernels import chemical_power, chemical_power_at, state_at
+
+
+@njit(cache=True)
+def _energy_before(after, power, step, low, high, battery):
+    """Stored energy within [low, high] from which a step leads to `after`; clipped to the window."""
+    energy = min(max(after, low), high)
+    for _ in range(100):
+        moved = after + step * chemical_power_at(power, energy, battery)
+        moved = min(max(moved, low), high)
+        if abs(moved - energy) <= 1e-12 * high:
+            break
+        energy = moved
+    return energy
+
+
+@njit(cache=True)
+def reachable(first, power, step_s, allowed, low, high, end_min, battery):
+    """Least and greatest stored energy (time + 1, mode) from which the end can still be reached.
+
+    least > greatest where it cannot. Between them there may be gaps: the rollout goes back from those.
+    """
+    steps, modes = first.shape[0], first.shape[1] - 1
+    least = np.full((steps + 1, modes), np.inf)
+    greatest = np.full((steps + 1, modes), -np.inf)
+    slack = 1e-12 * high
+    least[steps, :] = end_min
+    greatest[steps, :] = high
+    for k in range(steps - 1, -1, -1):
+        for n in range(modes):
+            bottom, top = least[k + 1, n], greatest[k + 1, n]
+            if bottom > top:
+                continue
+            lowest, highest = np.inf, -np.inf
+            for i in range(first[k, n], first[k, n + 1]):
+                a = _energy_before(bottom, power[i], step_s[k], low, high, battery)
+                b = _energy_before(top, power[i], step_s[k], low, high, battery)
+                after_a = a - step_s[k] * chemical_power_at(power[i], a, battery)
+                after_b = b - step_s[k] * chemical_power_at(power[i], b, battery)
+                if after_a > top + slack or after_b < bottom - slack:
+                    continue
+                lowest, highest = min(lowest, a), max(highest, b)
+            for m in range(modes):
+                if allowed[m, n]:
+                    least[k, m] = min(least[k, m], lowest)
+                    greatest[k, m] = max(greatest[k, m], highest)
+    return least, greatest
+
+
+@njit(cache=True)
+def rollout(first, cost, power, step_s, switch_kg, allowed, start_mode, start, value, grid_low,
+            cell, least, greatest, battery, budget):  # fmt: skip
+    """Entries (time,) of the path that follows a value function, and the steps it reached.
+
+    value: (time + 1, mode, node) cost-to-go at stored energy grid_low[k] + cell x node, linear between nodes
+    and beyond them.
+    A choice that leads where the end cannot be reached is not taken; a dead end is left the way it was
+    entered and closed, so that with enough budget every path is tried.
+    """
+    steps, modes = first.shape[0], first.shape[1] - 1
+    nodes = value.shape[2]
+    slack = 1e-12 * abs(greatest[steps, 0])
+    path = np.full(steps, -1, dtype=np.int64)
+    closed = np.zeros(len(cost), dtype=np.bool_)
+    energy = np.empty(steps + 1)
+    mode = np.empty(steps + 1, dtype=np.int64)
+    energy[0], mode[0] = start, start_mode
+    k, furthest, moves = 0, 0, 0
+    while k < steps and moves < budget:
+        moves += 1
+        best, chosen, chosen_mode, chosen_energy = np.inf, -1, 0, 0.0
+        _, voltage, discharge, charging = state_at(energy[k], battery)
+        for n in range(modes):
+            if not allowed[mode[k], n]:
+                continue
+            for i in range(first[k, n], first[k, n + 1]):
+                if closed[i]:
+                    continue
+                drain = chemical_power(
+                    power[i], voltage, discharge, charging, battery.coulombic_efficiency
+                )
+                after = energy[k] - step_s[k] * drain
+                if not (least[k + 1, n] - slack <= after <= greatest[k + 1, n] + slack):
+                    continue
+                place = (after - grid_low[k + 1]) / cell
+                j = min(max(int(np.floor(place)), 0), nodes - 2)
+                share = place - j
+                to_go = value[k + 1, n, j] * (1.0 - share) + value[k + 1, n, j + 1] * share
+                total = cost[i] + switch_kg[mode[k], n] + to_go
+                if total < best:
+                    best, chosen, chosen_mode, chosen_energy = total, i, n, after
+        if chosen < 0:
+            closed[first[k, 0] : first[k, modes]] = False
+            k -= 1
+            if k < 0:
+                break
+            closed[path[k]] = True
+            continue
+        path[k] = chosen
+        energy[k + 1], mode[k + 1] = chosen_energy, chosen_mode
+        k += 1
+        furthest = max(furthest, k)
+    return path, k, furthest, moves
+
+
+@njit(cache=True, fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+def _relax(best, value, cost, low, high, cells, share, share_slope):
+    """best[j] = min(best[j], cost + value at node j + cells + share_j) for low <= j < high."""
+    ahead = value[low + cells : high + cells + 1]
+    here = best[low:high]
+    for j in range(high - low):
+        weight = share + share_slope * j
+        candidate = cost + ahead[j] + weight * (ahead[j + 1] - ahead[j])
+        here[j] = min(here[j], candidate)
+
+
+@njit(cache=True)
+def _shift(best, value, cost, low, high, start, slope, floor_kg):
+    """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away.
+
+    Beyond the top node charge is thrown away; below the bottom one it costs floor_kg per cell.
+    """
+    nodes = len(value)
+    j = low
+    while j < high:
+        moved = start + slope * (j - low)
+        cells = int(np.floor(moved))
+        # The run of nodes over which the whole cells stay the same: slope is far below one.
+        run = high
+        if slope > 0:
+            run = min(high, low + int(np.ceil((cells + 1 - start) / slope)))
+        elif slope < 0:
+            run = min(high, low + int(np.floor((cells - start) / slope)) + 1)
+        run = max(run, j + 1)
+        bottom = min(max(j, -cells), run)
+        top = max(min(run, nodes - 1 - cells), bottom)
+        for i in range(j, bottom):
+            below = -(i + start + slope * (i - low))
+            best[i] = min(best[i], cost + value[0] + floor_kg * below)
+        if top > bottom:
+            first_share = start + slope * (bottom - low) - cells
+            _relax(best, value, cost, bottom, top, cells, first_share, slope)
+        for i in range(top, run):
+            best[i] = min(best[i], cost + value[nodes - 1])
+        j = run
+
+
+@njit(cache=True)
+def _bends(grid_low, cell, nodes, battery):
+    """Nodes between which a move is taken as linear, and voltage and resistances there."""
+    breaks = np.empty(len(battery.energy_j) + 2, dtype=np.int64)
+    breaks[0], count = 0, 1
+    for energy in battery.energy_j:
+        node = int(np.rint((energy - grid_low) / cell))
+        if breaks[count - 1] < node < nodes - 1:
+            breaks[count] = node
+            count += 1
+    breaks[count] = nodes - 1
+    states = np.empty((count + 1, 3))
+    for b in range(count + 1):
+        _, voltage, discharge, charging = state_at(grid_low + cell * breaks[b], battery)
+        states[b, 0], states[b, 1], states[b, 2] = voltage, discharge, charging
+    return breaks[: count + 1], states
+
+
+@njit(cache=True)
+def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low, cell, floor_kg,
+             unreachable_kg, battery):  # fmt: skip
+    """Cost-to-go (time + 1, mode, node) by value iteration over stored energy grid_low[k] + cell x node.
+
+    A choice moves every node by nearly the same energy; between the points of the battery's curves the move
+    is taken as linear in the node, so that the inner loop runs over contiguous memory. Switching is added
+    once per mode, after the minimum over the mode's choices.
+    """
+    steps, modes = first.shape[0], first.shape[1] - 1
+    nodes = len(terminal)
+    value = np.empty((steps + 1, modes, nodes))
+    least = np.empty((modes, nodes))
+    efficiency = battery.coulombic_efficiency
+    for m in range(modes):
+        value[steps, m] = terminal
+    for k in range(steps - 1, -1, -1):
+        breaks, states = _bends(grid_low[k], cell, nodes, battery)
+        drift = (grid_low[k] - grid_low[k + 1]) / cell
+        scale = -step_s[k] / cell
+        for n in range(modes):
+            least[n] = unreachable_kg
+            for i in range(first[k, n], first[k, n + 1]):
+                p = power[i]
+                end = drift + scale * chemical_power(
+                    p, states[0, 0], states[0, 1], states[0, 2], efficiency
+                )
+                for b in range(len(breaks) - 1):
+                    low, high = breaks[b], breaks[b + 1]
+                    start = end
+                    end = drift + scale * chemical_power(
+                        p, states[b + 1, 0], states[b + 1, 1], states[b + 1, 2], efficiency
+                    )
+                    last = high + 1 if b == len(breaks) - 2 else high
+                    slope = (end - start) / (high - low)
+                    _shift(least[n], value[k + 1, n], cost[i], low, last, start, slope, floor_kg)
+        for m in range(modes):
+            value[k, m] = unreachable_kg
+            for n in range(modes):
+                if allowed[m, n]:
+                    for j in range(nodes):
+                        value[k, m, j] = min(value[k, m, j], switch_kg[m, n] + least[n, j])
+    return value

@@ -1,0 +1,56 @@
+"""Compiled parts of the rule-based strategies."""
+
+import numpy as np
+from numba import njit
+
+from hevopt._battery_kernels import chemical_power_at
+
+
+@njit(cache=True)
+def load_point_choices(first, cost, power, nox, fired, charge_w, nox_cap_kgps, step_s):
+    """(level, time) entry of least cost among fired ones that charge at least charge_w[level] within the cap.
+
+    Where none does: the entry within the cap that charges most; where none is within it, that of least NOx.
+    -1 where the step has no fired entry at all.
+    """
+    steps, levels = len(step_s), len(charge_w)
+    chosen = np.full((levels, steps), -1, dtype=np.int64)
+    for k in range(steps):
+        most, least_nox = -1, -1
+        best = np.full(levels, np.inf)
+        for i in range(first[k, 0], first[k, -1]):
+            if not fired[i]:
+                continue
+            if least_nox < 0 or (nox[i], cost[i]) < (nox[least_nox], cost[least_nox]):
+                least_nox = i
+            if nox[i] > nox_cap_kgps * step_s[k]:
+                continue
+            if most < 0 or (power[i], cost[i]) < (power[most], cost[most]):
+                most = i
+            for level in range(levels):
+                if power[i] > -charge_w[level]:
+                    break
+                if cost[i] < best[level]:
+                    best[level] = cost[i]
+                    chosen[level, k] = i
+        for level in range(levels):
+            if chosen[level, k] < 0:
+                chosen[level, k] = most if most >= 0 else least_nox
+    return chosen
+
+
+@njit(cache=True)
+def drive(wanted, fallback, power, step_s, start_j, least_j, battery):
+    """Entries (time,) that take `wanted` while more than least_j is stored and else `fallback`, and the energy.
+
+    wanted, fallback: (time,) entries; they agree where there is nothing to choose.
+    """
+    steps = len(step_s)
+    entry = np.empty(steps, dtype=np.int64)
+    energy = np.empty(steps + 1)
+    energy[0] = start_j
+    for k in range(steps):
+        entry[k] = wanted[k] if energy[k] > least_j else fallback[k]
+        drain = chemical_power_at(power[entry[k]], energy[k], battery)
+        energy[k + 1] = energy[k] - step_s[k] * drain
+    return entry, energy

@@ -1,0 +1,227 @@
+"""What the rule-based strategies share: a driver's classes of step, and a charging power that keeps the charge.
+
+    standing   engine off, where it may be; on while a gear is engaged for a launch that the engine will drive
+    braking    without fuel where that is possible, recovering the most
+    driving    electrically below a power threshold and above a state of charge; else by the engine, which
+               charges with a given power (load-point shift) at least cost, within a cap on NOx
+
+The charging power is raised level by level until the charge is neutral; the last level and the one below it
+then share the cycle, changing once on the way, so that the end charge comes out close.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.choices import Choices, choices_of
+from hevopt.errors import DataError, InfeasibleError
+from hevopt.prices import one_price_dual
+from hevopt.problem import Plan, Problem
+from hevopt.simulate import total_cost_kg
+from hevopt.strategies import _rule_kernels as kernels
+
+Array = NDArray[np.float64]
+Entries = NDArray[np.int64]
+_CHARGE_LEVELS = 41
+# Electric driving stops here: this share of the SOC window above its lower end.
+_SOC_LEVEL_SHARE = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rules:
+    """Entries that each rule would take, per step; -1 where a step has none.
+
+    off, electric, recover: (time,); standing, launching, braking, power_w: (time,) class and wheel power
+    """
+
+    problem: Problem
+    choices: Choices
+    off: Entries
+    electric: Entries
+    recover: Entries
+    standing: NDArray[np.bool_]
+    engaging: NDArray[np.bool_]
+    braking: NDArray[np.bool_]
+    power_w: Array
+    fired: NDArray[np.bool_]
+    charge_w: Array
+    price_kgpj: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """One member of a rule family: its controls, cost, NOx and end charge."""
+
+    control: Entries
+    cost_kg: float
+    nox_kg: float
+    surplus_j: float
+    inside: bool
+
+
+def rules_of(problem: Problem) -> Rules:
+    """The rules' entries on a problem; DataError where it has no signals to base rules on."""
+    table = problem.table
+    if table.signals is None:
+        raise DataError("rule-based strategies need a table with signals (speed, power, gear)")
+    choices = choices_of(problem)
+    engine_on = np.array([control.engine_on for control in table.controls])
+    step = np.repeat(np.arange(choices.steps), choices.first[:, -1] - choices.first[:, 0])
+    fuel = table.fuel_kg[step, choices.control]
+    on = engine_on[choices.control]
+    signals = table.signals
+    standing, braking = signals.speed_mps == 0, signals.wheel_power_w < 0
+    charge_max = float(np.max(-choices.power_w, initial=0.0))
+    return Rules(
+        problem=problem,
+        choices=choices,
+        off=_least(choices, choices.power_w, ~on),
+        electric=_least(choices, choices.power_w, fuel == 0),
+        recover=_least(choices, choices.power_w, fuel == _step_minimum(choices, fuel)[step]),
+        standing=standing,
+        engaging=standing & (signals.gear > 0),
+        braking=braking,
+        power_w=signals.wheel_power_w,
+        # Standing or driving, the engine rule never picks a control without fuel.
+        fired=on & (fuel > 0),
+        charge_w=np.linspace(0.0, charge_max, _CHARGE_LEVELS),
+        price_kgpj=one_price_dual(problem)[-1].price_kgpj,
+    )
+
+
+def neutral_outcome(rules: Rules, threshold_w: float, nox_cap_kgps: float = np.inf) -> Outcome:
+    """The family's member for an electric threshold and a NOx cap, its charging power found for neutrality."""
+    shifted = _engine_entries(rules, nox_cap_kgps)
+    tried: dict[tuple[int, int], Outcome] = {}
+
+    def outcome(level: int, until: int) -> Outcome:
+        """The charging level up to a step and the level below it after."""
+        if (level, until) not in tried:
+            engine = shifted[level].copy()
+            engine[until:] = shifted[max(level - 1, 0), until:]
+            tried[level, until] = _outcome(rules, engine, threshold_w)
+        return tried[level, until]
+
+    steps, top = rules.choices.steps, len(rules.charge_w) - 1
+    if outcome(0, steps).surplus_j >= 0:
+        return outcome(0, steps)
+    if outcome(top, steps).surplus_j < 0:
+        return outcome(top, steps)
+    level = _first_true(0, top, lambda n: outcome(n, steps).surplus_j >= 0)
+    until = _first_true(0, steps, lambda n: outcome(level, n).surplus_j >= 0)
+    return outcome(level, until)
+
+
+def is_neutral(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
+    """Whether the window is kept and the end charge is worth at most a share of the cost."""
+    worth_kg = abs(outcome.surplus_j) * rules.price_kgpj
+    return outcome.inside and worth_kg <= share * outcome.cost_kg
+
+
+def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan:
+    """The neutral member of least figure; the whole family is its calibration, for the curve."""
+    calibration = [
+        {
+            **settings,
+            "cost_kg": outcome.cost_kg,
+            "corrected_kg": outcome.cost_kg - rules.price_kgpj * outcome.surplus_j,
+            "nox_kg": outcome.nox_kg,
+            "surplus_j": outcome.surplus_j,
+            "neutral": is_neutral(rules, outcome),
+        }
+        for settings, outcome in members
+    ]
+    inside = [n for n, (_, outcome) in enumerate(members) if outcome.inside]
+    if not inside:
+        raise InfeasibleError(
+            "no member of the rule family keeps the SOC window; widen it or use dp or ecms"
+        )
+    neutral = [n for n in inside if calibration[n]["neutral"]] or inside
+    chosen = min(neutral, key=lambda n: figure(calibration[n]))
+    return Plan(members[chosen][1].control, {"calibration": calibration, "chosen": chosen})
+
+
+def _engine_entries(rules: Rules, nox_cap_kgps: float) -> NDArray[np.int64]:
+    choices = rules.choices
+    steps = np.repeat(np.arange(choices.steps), choices.first[:, -1] - choices.first[:, 0])
+    nox = rules.problem.table.nox_kg[steps, choices.control]
+    shifted = kernels.load_point_choices(
+        choices.first, choices.cost_kg, choices.power_w, nox, rules.fired, rules.charge_w,
+        nox_cap_kgps, choices.step_s,
+    )  # fmt: skip
+    shifted = np.where(shifted >= 0, shifted, rules.recover)
+    # Load-point shift is for driving; standing, the engine covers the electric load and no more.
+    return np.where(rules.standing, shifted[0], shifted)
+
+
+def _outcome(rules: Rules, engine: Entries, threshold_w: float) -> Outcome:
+    choices, problem = rules.choices, rules.problem
+    driving = ~rules.standing & ~rules.braking
+    electric = driving & (rules.power_w <= threshold_w) & (rules.electric >= 0)
+    launch_on_engine = rules.engaging & ~_next_true(electric, rules.standing)
+    rest = np.where(rules.braking, rules.recover, engine)
+    stopped = rules.standing & ~launch_on_engine & (rules.off >= 0)
+    rest = np.where(stopped, rules.off, rest)
+    wanted = np.where(electric, rules.electric, rest)
+    low, high = problem.window_j
+    level = low + _SOC_LEVEL_SHARE * (high - low)
+    entry, energy = kernels.drive(
+        wanted,
+        rest,
+        choices.power_w,
+        choices.step_s,
+        problem.start_j,
+        level,
+        problem.battery.arrays,
+    )
+    control = choices.control[entry]
+    cost_kg, _ = total_cost_kg(problem, control)
+    slack = 1e-9 * (high - low)
+    return Outcome(
+        control,
+        cost_kg,
+        float(np.sum(problem.table.nox_kg[np.arange(choices.steps), control])),
+        float(energy[-1]) - problem.end_min_j,
+        bool((energy >= low - slack).all() and (energy <= high + slack).all())
+        and bool(problem.table.switch_allowed[_modes(problem, control)].all()),
+    )
+
+
+def _modes(problem: Problem, control: Entries) -> tuple[Entries, Entries]:
+    mode = problem.table.mode[control]
+    return np.concatenate([[problem.start_mode], mode[:-1]]), mode
+
+
+def _next_true(flags: NDArray[np.bool_], standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(time,) the flag of the first moving step at or after each step."""
+    moving = np.flatnonzero(~standing)
+    following = np.searchsorted(moving, np.arange(len(flags)))
+    inside = following < len(moving)
+    result = np.zeros(len(flags), dtype=bool)
+    result[inside] = flags[moving[following[inside]]]
+    return result
+
+
+def _least(choices: Choices, figure: Array, allowed: NDArray[np.bool_]) -> Entries:
+    """(time,) entry of least figure among the allowed ones, -1 where there is none."""
+    masked = np.where(allowed, figure, np.inf)
+    starts = choices.first[:, 0]
+    least = _step_minimum(choices, masked)
+    step = np.repeat(np.arange(choices.steps), choices.first[:, -1] - starts)
+    hits = np.flatnonzero((masked == least[step]) & np.isfinite(masked))
+    entry = np.full(choices.steps, -1, dtype=np.int64)
+    entry[step[hits][::-1]] = hits[::-1]
+    return entry
+
+
+def _step_minimum(choices: Choices, figure: Array) -> Array:
+    return np.minimum.reduceat(figure, choices.first[:, 0])
+
+
+def _first_true(low: int, high: int, holds) -> int:
+    """The first n in (low, high] at which `holds` turns true, given that it is false at low and true at high."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high

@@ -1,0 +1,25 @@
+"""The rule-based fuel strategy of the study.
+
+Above a state of charge the car is driven electrically until a power threshold; it recovers what braking gives;
+otherwise the engine runs and shifts its load point to keep the charge neutral; it rests at standstill. The
+threshold is calibrated: of the whole family, the member of least charge-corrected cost.
+"""
+
+import numpy as np
+
+from hevopt.problem import Plan, Problem
+from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
+
+_THRESHOLDS = 24
+
+
+def solve(problem: Problem) -> Plan:
+    """The family's best member; notes["calibration"] holds the curve over the threshold."""
+    rules = rules_of(problem)
+    electric = ~rules.standing & ~rules.braking & (rules.electric >= 0)
+    top_w = float(np.max(rules.power_w[electric], initial=0.0))
+    members = [
+        ({"threshold_w": threshold}, neutral_outcome(rules, threshold))
+        for threshold in np.linspace(0.0, top_w, _THRESHOLDS).tolist()
+    ]
+    return best_plan(rules, members, lambda member: member["corrected_kg"])

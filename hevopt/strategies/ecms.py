@@ -1,0 +1,136 @@
+"""Equivalent consumption minimisation: fuel plus a constant price on the battery's chemical power.
+
+Each step takes the control of least  cost + s x (fall of stored energy); switching costs are exact, the mode
+path being the shortest under that price (Viterbi), and the fall is that of the true battery at the present state
+of charge. s, the equivalence factor in kg/J, is found so that the charge is neutral.
+
+The end charge jumps as s moves, because a nearly straight fuel map makes many steps change at one price. Where
+no s is neutral two neighbouring factors share the cycle, changing once on the way, in either order; and a plan
+that would end short is also tried with the charge made good as late as possible. The cheapest plan tried that
+ends with at least the asked charge is taken.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt._prices_kernels import shortest_path
+from hevopt.battery import chemical_power_w
+from hevopt.choices import Choices, choices_of
+from hevopt.errors import SolverError
+from hevopt.prices import one_price_dual, step_of_entry, typical_price_kgpj
+from hevopt.problem import Plan, Problem
+from hevopt.simulate import total_cost_kg
+from hevopt.strategies._rollout import reach_of, roll
+
+Array = NDArray[np.float64]
+_FACTOR_TOLERANCE = 1e-7
+_BRACKET_STEPS_MAX = 60
+_ENERGY_ROUNDING = 1e-12
+
+
+class _Search:
+    """Rollouts of one problem under prices, and the cheapest of them that ends with enough charge."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.choices = choices_of(problem)
+        self.bound_reach = reach_of(problem, self.choices, problem.end_min_j)
+        self.free_reach = reach_of(problem, self.choices, problem.window_j[0])
+        self.drain_j = _drain_at_start_j(problem, self.choices)
+        counts = self.choices.first[:, -1] - self.choices.first[:, 0]
+        self.step = np.repeat(np.arange(self.choices.steps), counts)
+        self.best_cost_kg, self.best_control, self.best_prices = np.inf, None, None
+
+    def surplus_j(self, price_kgpj: Array, *, to_the_end: bool = False) -> float:
+        """Stored energy above the asked end charge under (time,) prices; `to_the_end`: never below it."""
+        low, high = self.problem.window_j
+        choices = self.choices
+        priced = choices.cost_kg + price_kgpj[self.step] * self.drain_j
+        _, _, to_go = shortest_path(
+            choices.first,
+            priced,
+            choices.switch_kg,
+            choices.switch_allowed,
+            self.problem.start_mode,
+        )
+        # A mode without a way on is never entered: the reach is empty there.
+        to_go = np.where(np.isfinite(to_go), to_go, 0.0)
+        of_step = np.concatenate([price_kgpj[:1], price_kgpj])[:, None, None]
+        value = to_go[:, :, None] - of_step * np.array([low, high])
+        reach = self.bound_reach if to_the_end else self.free_reach
+        grid_low = np.full(choices.steps + 1, low)
+        path = roll(self.problem, choices, reach, value, grid_low, high - low)
+        control = choices.control[path]
+        cost_kg, energy_j = total_cost_kg(self.problem, control)
+        surplus = float(energy_j[-1]) - self.problem.end_min_j
+        if surplus >= -_ENERGY_ROUNDING * high and cost_kg < self.best_cost_kg:
+            self.best_cost_kg, self.best_control = cost_kg, control
+            self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
+        return surplus
+
+
+def solve(problem: Problem) -> Plan:
+    """The cheapest plan of one factor, or a pair of neighbouring factors, that keeps the charge."""
+    search = _Search(problem)
+    guess = one_price_dual(problem)[-1].price_kgpj
+    guess = guess or typical_price_kgpj(search.choices, search.drain_j)
+    every = np.ones(search.choices.steps)
+    cheap, dear = _neutral_factors(search, guess)
+    search.surplus_j(cheap * every, to_the_end=True)
+    search.surplus_j(guess * every, to_the_end=True)
+    if cheap < dear:
+        _change_once(search, dear, cheap)
+        _change_once(search, cheap, dear)
+    first, last = search.best_prices
+    notes = {"price_kgpj": first, "price_at_end_kgpj": last}
+    return Plan(search.best_control, notes)
+
+
+def _change_once(search: _Search, before: float, after: float) -> None:
+    """Try factors that change once, halving the cycle until neighbouring steps leave more and less charge."""
+    steps = np.arange(search.choices.steps)
+    less, enough = (0, len(steps)) if before > after else (len(steps), 0)
+    while abs(enough - less) > 1:
+        middle = (less + enough) // 2
+        surplus = search.surplus_j(np.where(steps < middle, before, after))
+        less, enough = (less, middle) if surplus >= 0 else (middle, enough)
+    search.surplus_j(np.where(steps < less, before, after), to_the_end=True)
+
+
+def _neutral_factors(search: _Search, guess: float) -> tuple[float, float]:
+    """Neighbouring factors of which the cheaper leaves too little charge and the dearer enough."""
+    every = np.ones(search.choices.steps)
+    if search.surplus_j(0.0 * every) >= 0:
+        return 0.0, 0.0
+    cheap, dear = 0.98 * guess, 1.02 * guess
+    while search.surplus_j(cheap * every) >= 0:
+        cheap *= 0.8
+    for _ in range(_BRACKET_STEPS_MAX):
+        if search.surplus_j(dear * every) >= 0:
+            break
+        dear *= 1.25
+    else:
+        raise SolverError(
+            f"ecms: no equivalence factor up to {dear:g} kg/J reaches the asked end charge; "
+            "use dp, which plans for it"
+        )
+    while dear - cheap > _FACTOR_TOLERANCE * dear:
+        middle = (cheap + dear) / 2
+        if search.surplus_j(middle * every) >= 0:
+            dear = middle
+        else:
+            cheap = middle
+    return cheap, dear
+
+
+def _drain_at_start_j(problem: Problem, choices: Choices) -> Array:
+    """(entry,) fall of stored energy at the start's state of charge, for planning the mode path."""
+    soc, pack = problem.soc_start, problem.battery
+    resistance = np.where(
+        choices.power_w < 0,
+        np.interp(soc, pack.soc, pack.charge_ohm),
+        np.interp(soc, pack.soc, pack.discharge_ohm),
+    )
+    voltage = np.interp(soc, pack.soc, pack.open_circuit_v)
+    drain_w = chemical_power_w(pack, choices.power_w, voltage, resistance)
+    return drain_w * step_of_entry(choices)

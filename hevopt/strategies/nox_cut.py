@@ -1,0 +1,33 @@
+"""The rule-based NOx strategy of the study: the machine assists to cut the power peaks that make NOx.
+
+The engine drives under a cap on its NOx flow, the machine giving the rest, even in moderate acceleration; the
+energy comes back from braking and, within the cap, from load-point shift. Cap and electric threshold are
+calibrated: of the whole family, the member of least NOx.
+"""
+
+import numpy as np
+
+from hevopt.problem import Plan, Problem
+from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
+
+_CAPS = 10
+_THRESHOLDS = 4
+_ELECTRIC_SHARE_MAX = 0.3
+
+
+def solve(problem: Problem) -> Plan:
+    """The family's member of least NOx; notes["calibration"] holds it all."""
+    rules = rules_of(problem)
+    driving = ~rules.standing & ~rules.braking
+    top_w = float(np.max(rules.power_w[driving & (rules.electric >= 0)], initial=0.0))
+    nox_kgps = problem.table.nox_kg / problem.table.step_s[:, None]
+    peak = float(np.max(nox_kgps[driving], initial=0.0))
+    members = [
+        (
+            {"threshold_w": threshold, "nox_cap_kgps": cap},
+            neutral_outcome(rules, threshold, cap),
+        )
+        for threshold in np.linspace(0.0, _ELECTRIC_SHARE_MAX * top_w, _THRESHOLDS).tolist()
+        for cap in (peak * np.geomspace(0.03, 1.0, _CAPS)).tolist()
+    ]
+    return best_plan(rules, members, lambda member: member["nox_kg"])

@@ -1,0 +1,16 @@
+"""Start&stop: the engine rests while the car stands, unless a gear is being engaged before moving off.
+
+What the electric load took meanwhile is charged back while driving; see _rules.py for the charging power.
+"""
+
+from hevopt.problem import Plan, Problem
+from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
+
+_NEVER_ELECTRIC_W = -1.0
+
+
+def solve(problem: Problem) -> Plan:
+    """The plan of the rule, with the charging power that keeps the charge."""
+    rules = rules_of(problem)
+    outcome = neutral_outcome(rules, _NEVER_ELECTRIC_W)
+    return best_plan(rules, [({}, outcome)], lambda member: member["corrected_kg"])

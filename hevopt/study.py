@@ -1,0 +1,219 @@
+"""The study: run strategies on architectures over one cycle, and collect a row for each."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from time import perf_counter
+
+from hevopt.architecture import Architecture, load_architecture
+from hevopt.certificate import Certificate, certify
+from hevopt.cycle import Cycle, load_cycle
+from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
+from hevopt.files import shipped_names
+from hevopt.powertrain import build_problem
+from hevopt.problem import Plan, Problem, Trajectory
+from hevopt.simulate import simulate
+from hevopt.strategies import dp, fitting, strategy_named
+from hevopt.units import litres_per_100km
+
+NEUTRAL_PERCENT = 1.0
+REFERENCE_ARCHITECTURE = "A"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One architecture and strategy. None where a case failed, or where there is no reference.
+
+    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy), "shortfall" (steps
+    driven with less than the cycle asks), joined by commas, or "failed: ..." with the reason
+    bound_l_per_100km: least of fuel + weighted NOx that any plan with this row's end charge could reach,
+    as fuel volume; gap_percent: this row's own sum above it
+    """
+
+    architecture: str
+    strategy: str
+    status: str
+    fuel_l_per_100km: float | None = None
+    delta_fuel_percent: float | None = None
+    co2_g_per_km: float | None = None
+    nox_mg_per_km: float | None = None
+    delta_nox_percent: float | None = None
+    soc_start: float | None = None
+    soc_end: float | None = None
+    delta_energy_percent: float | None = None
+    fuel_corrected_l_per_100km: float | None = None
+    engine_starts: int | None = None
+    bound_l_per_100km: float | None = None
+    gap_percent: float | None = None
+    certificate: str | None = None
+    solve_s: float | None = None
+
+    def as_dict(self) -> dict:
+        """All fields by name, in order."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All rows of a cycle, and the messages of what failed, by architecture and strategy."""
+
+    cycle: str
+    rows: list[Row]
+    failures: dict[str, HevoptError] = field(default_factory=dict)
+    nox_weight: float = 0.0
+    reference: str | None = None
+
+
+def solve(problem: Problem, strategy: str = "dp") -> Plan:
+    """The plan of a strategy by name."""
+    return strategy_named(strategy).solve(problem)
+
+
+def compare(
+    cycle: Cycle | str | Path = "nedc",
+    architectures: Sequence[Architecture | str | Path] | None = None,
+    strategies: Sequence[str] | None = None,
+    *,
+    nox_weight: float = 0.0,
+    allow_shortfall: bool = False,
+    progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+) -> Comparison:
+    """Every strategy (by default all that fit) on every architecture (by default the shipped ones).
+
+    progress: called with what comes next, and how many cases of how many are done.
+    """
+    if not isinstance(cycle, Cycle):
+        cycle = load_cycle(cycle)
+    names = shipped_names("architectures", ".toml") if architectures is None else architectures
+    cars = [a if isinstance(a, Architecture) else load_architecture(a) for a in names]
+    if not cars:
+        raise DataError("no architecture given; name at least one")
+    for name in strategies or ():
+        strategy_named(name)
+    plans = [(car, list(strategies or fitting(car.functions))) for car in cars]
+    total, done = sum(len(names) for _, names in plans), 0
+    rows: list[Row] = []
+    failures: dict[str, HevoptError] = {}
+    for car, wanted in plans:
+        progress(f"{car.name}: table and certificate", done, total)
+        try:
+            problem = build_problem(
+                car, cycle, nox_weight=nox_weight, allow_shortfall=allow_shortfall
+            )
+            certificate = reference_certificate(problem)
+        except (InfeasibleError, SolverError) as error:
+            failures[car.name] = error
+            rows += [_failed(car, name, error) for name in wanted]
+            done += len(wanted)
+            continue
+        for name in wanted:
+            progress(f"{car.name}: {name}", done, total)
+            try:
+                rows.append(run_case(car, cycle, problem, certificate, name)[0])
+            except (InfeasibleError, SolverError) as error:
+                failures[f"{car.name} {name}"] = error
+                rows.append(_failed(car, name, error))
+            done += 1
+    rows, reference = _against_reference(rows)
+    return Comparison(cycle.name, rows, failures, nox_weight, reference)
+
+
+def reference_certificate(problem: Problem) -> Certificate:
+    """The certificate of a problem, with costate prices along dynamic programming's rollout."""
+    return certify(problem, simulate(problem, dp.solve(problem).control))
+
+
+def run_case(
+    car: Architecture, cycle: Cycle, problem: Problem, certificate: Certificate, strategy: str
+) -> tuple[Row, Plan, Trajectory]:
+    """One strategy on one problem: its row (no reference yet), plan and trajectory."""
+    began = perf_counter()
+    plan = strategy_named(strategy).solve(problem)
+    solve_s = perf_counter() - began
+    trajectory = simulate(problem, plan.control)
+    return _row(car, cycle, problem, certificate, strategy, trajectory, solve_s), plan, trajectory
+
+
+def _row(
+    car: Architecture,
+    cycle: Cycle,
+    problem: Problem,
+    certificate: Certificate,
+    strategy: str,
+    trajectory: Trajectory,
+    solve_s: float,
+) -> Row:
+    fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
+    gained_j = trajectory.end_j - problem.start_j
+    energy_percent = 100 * gained_j / max(fuel_kg * car.engine.heating_value_jpkg, 1e-9)
+    bound_kg, proof = certificate.bound_kg(trajectory.end_j)
+
+    def litres(mass_kg: float) -> float:
+        return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
+
+    return Row(
+        architecture=car.name,
+        strategy=strategy,
+        status=_status(problem, energy_percent),
+        fuel_l_per_100km=litres(fuel_kg),
+        co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
+        nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km,
+        soc_start=float(trajectory.soc[0]),
+        soc_end=float(trajectory.soc[-1]),
+        delta_energy_percent=energy_percent,
+        fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * gained_j),
+        engine_starts=engine_starts(problem, trajectory),
+        bound_l_per_100km=litres(bound_kg),
+        gap_percent=100 * (trajectory.cost_kg - bound_kg) / max(abs(bound_kg), 1e-12),
+        certificate=proof,
+        solve_s=solve_s,
+    )
+
+
+def engine_starts(problem: Problem, trajectory: Trajectory) -> int:
+    """How often the engine goes from rest to turning."""
+    on = [problem.table.controls[c].engine_on for c in trajectory.control]
+    start_on = any(
+        control.engine_on
+        for control, mode in zip(problem.table.controls, problem.table.mode, strict=True)
+        if mode == problem.start_mode
+    )
+    return sum(now and not before for before, now in zip([start_on, *on], on, strict=False))
+
+
+def _status(problem: Problem, energy_percent: float) -> str:
+    marks = []
+    if abs(energy_percent) > NEUTRAL_PERCENT:
+        marks.append("not neutral")
+    missing = problem.table.missing_torque_nm
+    if missing is not None and (missing > 0).any():
+        marks.append(f"shortfall at {int((missing > 0).sum())} steps")
+    return ", ".join(marks) or "ok"
+
+
+def _failed(car: Architecture, strategy: str, error: HevoptError) -> Row:
+    return Row(car.name, strategy, f"failed: {str(error).splitlines()[0].rstrip(':')}")
+
+
+def _against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
+    """Rows with their change against the first good row of architecture A, or else of the table."""
+    good = [row for row in rows if row.fuel_l_per_100km is not None]
+    named = [row for row in good if row.architecture == REFERENCE_ARCHITECTURE]
+    if not good:
+        return rows, None
+    base = (named or good)[0]
+
+    def change(value: float | None, reference: float | None) -> float | None:
+        return None if value is None or not reference else 100 * (value / reference - 1)
+
+    changed = [
+        Row(
+            **row.as_dict()
+            | {
+                "delta_fuel_percent": change(row.fuel_l_per_100km, base.fuel_l_per_100km),
+                "delta_nox_percent": change(row.nox_mg_per_km, base.nox_mg_per_km),
+            }
+        )
+        for row in rows
+    ]
+    return changed, f"{base.architecture} {base.strategy}"

@@ -1,0 +1,65 @@
+"""Gearbox and final drive, equations (13) and (14): efficiency by the direction of power flow."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gearbox:
+    """Forward gears with the final drive; gear 0 is neutral.
+
+    ratios, efficiency: (gear + 1,) input to wheels, index 0 for neutral
+    up_mps, down_mps: (gear - 1,) speeds of the change up from, and down to, gears 1, 2, ...
+    """
+
+    name: str
+    ratios: Array
+    efficiency: Array
+    up_mps: Array
+    down_mps: Array
+    engage_before_launch_s: float
+
+
+def output_torque_nm(input_nm: Array, ratio: Array, efficiency: Array) -> Array:
+    """Torque at the wheels for a torque at the input."""
+    return np.where(input_nm > 0, input_nm * efficiency, input_nm / efficiency) * ratio
+
+
+def input_torque_nm(output_nm: Array, ratio: Array, efficiency: Array) -> Array:
+    """Torque at the input for a torque at the wheels: the inverse of `output_torque_nm`."""
+    return np.where(output_nm > 0, output_nm / efficiency, output_nm * efficiency) / ratio
+
+
+def gears_from_shift_speeds(
+    gearbox: Gearbox, time_s: Array, speed_mps: Array
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Gear and open clutch per step for a trace without gears, from the speed at the step's end or start,
+    whichever is higher.
+
+    At standstill neutral; first gear with open clutch `engage_before_launch_s` before moving off.
+    """
+    steps = len(time_s) - 1
+    gear = np.zeros(steps, dtype=np.int64)
+    moving = (speed_mps[1:] + speed_mps[:-1]) > 0
+    current = 1
+    for k in range(steps):
+        if not moving[k]:
+            current = 1
+            continue
+        speed = max(speed_mps[k], speed_mps[k + 1])
+        while current <= len(gearbox.up_mps) and speed > gearbox.up_mps[current - 1]:
+            current += 1
+        while current > 1 and speed < gearbox.down_mps[current - 2]:
+            current -= 1
+        gear[k] = current
+    clutch_open = np.zeros(steps, dtype=bool)
+    for k in np.flatnonzero(moving[1:] & ~moving[:-1]):
+        launch_s = time_s[k + 1]
+        waiting = ~moving[: k + 1] & (time_s[: k + 1] >= launch_s - gearbox.engage_before_launch_s)
+        gear[: k + 1][waiting] = 1
+        clutch_open[: k + 1][waiting] = True
+    return gear, clutch_open

@@ -1,0 +1,46 @@
+"""The car on the road: resistance forces, equations (5) to (12) of the study."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.units import STANDARD_GRAVITY_MPS2
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A car without its powertrain.
+
+    road_load: (4,) force on a level road as polynomial of speed, F = r0 + r1 v + r2 v² + r3 v³ (N, m/s);
+    rolling resistance times cos of the slope is contained in `rolling_n`, its (4,) share that scales so.
+    """
+
+    name: str
+    mass_kg: float
+    tyre_radius_m: float
+    wheel_inertia_kgm2: float
+    auxiliary_power_w: float
+    rolling_n: tuple[float, float, float, float]
+    air_n: tuple[float, float, float, float]
+
+    @property
+    def equivalent_mass_kg(self) -> float:
+        """Mass with the wheels' inertia, equation (11); engine and machine are charged on their shafts."""
+        return self.mass_kg + self.wheel_inertia_kgm2 / self.tyre_radius_m**2
+
+
+def tractive_force_n(vehicle: Vehicle, speed_mps: Array, accel_mps2: Array, grade: Array) -> Array:
+    """Force at the tyres that keeps speed and acceleration; 0 at standstill, where the brakes hold.
+
+    All arguments and the result: (time,). Equations (5) to (12); rolling and air resistance need motion.
+    """
+    slope_rad = np.arctan(grade)
+    powers = np.stack([np.ones_like(speed_mps), speed_mps, speed_mps**2, speed_mps**3])
+    rolling = np.asarray(vehicle.rolling_n) @ powers * np.cos(slope_rad)
+    air = np.asarray(vehicle.air_n) @ powers
+    climbing = vehicle.mass_kg * STANDARD_GRAVITY_MPS2 * np.sin(slope_rad)
+    force = rolling + air + climbing + vehicle.equivalent_mass_kg * accel_mps2
+    return np.where(speed_mps > 0, force, 0.0)
