@@ -20,7 +20,7 @@ _HOME = {
     "Battery": "hevopt.battery",
     "STRATEGIES": "hevopt.strategies",
     "solve": "hevopt.study",
-    "simulate": "hevopt.simulate",
+    "simulate": "hevopt.simulation",
     "certify": "hevopt.certificate",
     "Certificate": "hevopt.certificate",
     "compare": "hevopt.study",

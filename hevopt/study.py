@@ -12,7 +12,7 @@ from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
 from hevopt.files import shipped_names
 from hevopt.powertrain import build_problem
 from hevopt.problem import Plan, Problem, Trajectory
-from hevopt.simulate import simulate
+from hevopt.simulation import simulate
 from hevopt.strategies import dp, fitting, strategy_named
 from hevopt.units import litres_per_100km
 

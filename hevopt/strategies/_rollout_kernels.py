@@ -5,6 +5,9 @@ from numba import njit
 
 from hevopt._battery_kernels import chemical_power, chemical_power_at, state_at
 
+# Divisions of the grid between which a move over curved battery characteristics is taken as linear.
+_PIECES = 24
+
 
 @njit(cache=True)
 def _energy_before(after, power, step, low, high, battery):
@@ -120,10 +123,10 @@ def _relax(best, value, cost, low, high, cells, share, share_slope):
 
 
 @njit(cache=True)
-def _shift(best, value, cost, low, high, start, slope, floor_kg):
+def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
     """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away.
 
-    Beyond the top node charge is thrown away; below the bottom one it costs floor_kg per cell.
+    Beyond the bottom and the top node every cell costs floor_kg and ceiling_kg.
     """
     nodes = len(value)
     j = low
@@ -146,31 +149,31 @@ def _shift(best, value, cost, low, high, start, slope, floor_kg):
             first_share = start + slope * (bottom - low) - cells
             _relax(best, value, cost, bottom, top, cells, first_share, slope)
         for i in range(top, run):
-            best[i] = min(best[i], cost + value[nodes - 1])
+            above = i + start + slope * (i - low) - (nodes - 1)
+            best[i] = min(best[i], cost + value[nodes - 1] + ceiling_kg * above)
         j = run
 
 
 @njit(cache=True)
 def _bends(grid_low, cell, nodes, battery):
-    """Nodes between which a move is taken as linear, and voltage and resistances there."""
-    breaks = np.empty(len(battery.energy_j) + 2, dtype=np.int64)
-    breaks[0], count = 0, 1
-    for energy in battery.energy_j:
-        node = int(np.rint((energy - grid_low) / cell))
-        if breaks[count - 1] < node < nodes - 1:
-            breaks[count] = node
-            count += 1
-    breaks[count] = nodes - 1
-    states = np.empty((count + 1, 3))
-    for b in range(count + 1):
+    """Nodes between which a move is taken as linear, and voltage and resistances there.
+
+    The ends, where voltage is linear in SOC and resistance constant; else also _PIECES even divisions.
+    """
+    constant = np.ptp(battery.discharge_ohm) == 0.0 and np.ptp(battery.charge_ohm) == 0.0
+    pieces = 1 if constant and len(battery.soc) == 2 else min(_PIECES, nodes - 1)
+    breaks = np.empty(pieces + 1, dtype=np.int64)
+    states = np.empty((pieces + 1, 3))
+    for b in range(pieces + 1):
+        breaks[b] = b * (nodes - 1) // pieces
         _, voltage, discharge, charging = state_at(grid_low + cell * breaks[b], battery)
         states[b, 0], states[b, 1], states[b, 2] = voltage, discharge, charging
-    return breaks[: count + 1], states
+    return breaks, states
 
 
 @njit(cache=True)
 def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low, cell, floor_kg,
-             unreachable_kg, battery):  # fmt: skip
+             ceiling_kg, unreachable_kg, battery):  # fmt: skip
     """Cost-to-go (time + 1, mode, node) by value iteration over stored energy grid_low[k] + cell x node.
 
     A choice moves every node by nearly the same energy; between the points of the battery's curves the move
@@ -203,7 +206,10 @@ def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low,
                     )
                     last = high + 1 if b == len(breaks) - 2 else high
                     slope = (end - start) / (high - low)
-                    _shift(least[n], value[k + 1, n], cost[i], low, last, start, slope, floor_kg)
+                    _shift(
+                        least[n], value[k + 1, n], cost[i], low, last, start, slope, floor_kg,
+                        ceiling_kg,
+                    )  # fmt: skip
         for m in range(modes):
             value[k, m] = unreachable_kg
             for n in range(modes):

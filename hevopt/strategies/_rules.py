@@ -18,7 +18,7 @@ from hevopt.choices import Choices, choices_of
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.prices import one_price_dual
 from hevopt.problem import Plan, Problem
-from hevopt.simulate import total_cost_kg
+from hevopt.simulation import total_cost_kg
 from hevopt.strategies import _rule_kernels as kernels
 
 Array = NDArray[np.float64]

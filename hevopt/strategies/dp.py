@@ -3,12 +3,16 @@
     V_t(m, E) = min over u of  cost_t(u) + switching(m, mode(u)) + V_t+1(mode(u), E - r_t(u, E))
 
 The value function is tabulated over a grid of stored energy and interpolated linearly; it only guides the
-rollout, whose path is exact, stays within the window and ends with at least the charge that is asked. Missing
-charge at the end costs a multiple of the dual's price, steep enough to be avoided and finite, so that
-interpolation never meets infinity.
+rollout, whose path is exact, stays within the window and ends with at least the charge that is asked. Outside
+the window, and for charge missing at the end, a finite price takes the place of infinity, so that interpolation
+stays meaningful: a gentle one first, and charge beyond a full battery may be thrown away, which makes every
+dominated choice superfluous. Where the rollout cannot keep what the value function promised, that gentleness
+misled it, and steep prices with all choices follow.
 
 The first grid spans the SOC window; the next ones a band around the path found, each ten times finer.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +21,30 @@ from hevopt.choices import Choices, choices_of, without_dominated
 from hevopt.errors import DataError
 from hevopt.prices import one_price_dual, typical_price_kgpj
 from hevopt.problem import Plan, Problem
-from hevopt.simulate import total_cost_kg
+from hevopt.simulation import total_cost_kg
 from hevopt.strategies import _rollout_kernels as kernels
 from hevopt.strategies._rollout import Reach, reach_of, roll
 
 Array = NDArray[np.float64]
 ENERGY_NODES = 1001
-# Width of each grid as a share of the SOC window.
+# Widths of the grids as shares of the SOC window.
 _BANDS = (1.0, 0.1, 0.01)
-# Missing charge costs this many times its worth, so that no plan of use ever leaves some.
-_PENALTY_FACTOR = 5.0
+# Missing charge costs this many times what it is worth.
+_GENTLE, _STEEP = 5.0, 1e4
+# A rollout dearer than promised by this share has been misled.
+_PROMISE_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Setting:
+    """A problem with what every grid needs. choices: those of the recursion; every: those of the rollout."""
+
+    problem: Problem
+    every: Choices
+    choices: Choices
+    reach: Reach
+    penalty_kgpj: float
+    hard_top: bool
 
 
 def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -> Plan:
@@ -36,17 +54,37 @@ def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -
     every = choices_of(problem)
     reach = reach_of(problem, every, problem.end_min_j)
     price = one_price_dual(problem)[-1].price_kgpj
+    worth = max(price, 0.01 * typical_price_kgpj(every, every.power_w))
+    gentle = _Setting(
+        problem, every, without_dominated(every), reach, _GENTLE * worth, hard_top=False
+    )
+    bands = _BANDS if refine else _BANDS[:1]
+    cost, control, promised = _search(gentle, bands, nodes)
+    if cost - promised > _PROMISE_TOLERANCE * abs(cost):
+        steep = _Setting(problem, every, every, reach, _STEEP * worth, hard_top=True)
+        steep_cost, steep_control, _ = _search(steep, bands, nodes)
+        if steep_cost < cost:
+            control = steep_control
+    return Plan(control, {"price_kgpj": price, "nodes": nodes})
+
+
+def _search(
+    setting: _Setting, bands: tuple[float, ...], nodes: int
+) -> tuple[float, NDArray[np.int64], float]:
+    """Cost and controls of the best path over all grids, and what the first grid promised."""
+    problem, choices = setting.problem, setting.every
     low, high = problem.window_j
-    centre = np.full(every.steps + 1, (low + high) / 2)
-    best_cost, best_path, path = np.inf, None, None
-    for band in _BANDS if refine else _BANDS[:1]:
+    centre = np.full(choices.steps + 1, (low + high) / 2)
+    best_cost, best, promises = np.inf, None, []
+    for band in bands:
         cell = band * (high - low) / (nodes - 1)
         grid_low = _grid_low_j(problem, centre, cell, nodes)
-        path = _solve_on_grid(problem, every, reach, price, grid_low, cell, nodes)
-        cost, centre = total_cost_kg(problem, every.control[path])
+        path, promise = _solve_on_grid(setting, grid_low, cell, nodes)
+        promises.append(promise)
+        cost, energy_j = total_cost_kg(problem, choices.control[path])
         if cost < best_cost:
-            best_cost, best_path = cost, path
-    return Plan(every.control[best_path], {"price_kgpj": price, "nodes": nodes})
+            best_cost, best, centre = cost, choices.control[path], energy_j
+    return best_cost, best, promises[0]
 
 
 def _grid_low_j(problem: Problem, centre_j: Array, cell_j: float, nodes: int) -> Array:
@@ -58,24 +96,21 @@ def _grid_low_j(problem: Problem, centre_j: Array, cell_j: float, nodes: int) ->
 
 
 def _solve_on_grid(
-    problem: Problem,
-    every: Choices,
-    reach: Reach,
-    price: float,
-    grid_low: Array,
-    cell: float,
-    nodes: int,
-) -> NDArray[np.int64]:
-    choices = without_dominated(every)
-    penalty = _PENALTY_FACTOR * max(price, 0.01 * typical_price_kgpj(every, every.power_w))
+    setting: _Setting, grid_low: Array, cell: float, nodes: int
+) -> tuple[NDArray[np.int64], float]:
+    """Entries (time,) of the rollout on one grid, and the cost its value function promised."""
+    problem, choices, penalty = setting.problem, setting.choices, setting.penalty_kgpj
     last_grid = grid_low[-1] + cell * np.arange(nodes)
     terminal = penalty * np.maximum(problem.end_min_j - last_grid, 0.0)
     value = kernels.backward(
         choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
         choices.switch_allowed, terminal, grid_low, cell, penalty * cell,
-        _unreachable_kg(every, terminal), problem.battery.arrays,
+        penalty * cell if setting.hard_top else 0.0, _unreachable_kg(choices, terminal),
+        problem.battery.arrays,
     )  # fmt: skip
-    return roll(problem, every, reach, value, grid_low, cell)
+    first_grid = grid_low[0] + cell * np.arange(nodes)
+    promised = float(np.interp(problem.start_j, first_grid, value[0, problem.start_mode]))
+    return roll(problem, setting.every, setting.reach, value, grid_low, cell), promised
 
 
 def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:

@@ -19,7 +19,7 @@ from hevopt.choices import Choices, choices_of
 from hevopt.errors import SolverError
 from hevopt.prices import one_price_dual, step_of_entry, typical_price_kgpj
 from hevopt.problem import Plan, Problem
-from hevopt.simulate import total_cost_kg
+from hevopt.simulation import total_cost_kg
 from hevopt.strategies._rollout import reach_of, roll
 
 Array = NDArray[np.float64]
