@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 _BRAKING_LEVELS = 6
 _TORQUE_TOLERANCE_NM = 1e-6
-_SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency")
+_SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency", "fuel cut")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,10 @@ def machine_torques(
         return torque, labels, spread
     best_engine = engine_model.best_torque_nm(architecture.engine, joint.engine_speed_radps)
     best = machine_torque_at(architecture, demand, joint, best_engine)
-    torque = np.column_stack([torque, np.zeros_like(idle), idle, best])
+    least = least_engine_torque(architecture, joint)
+    cut = machine_torque_at(architecture, demand, joint, least)
+    cut = np.clip(cut, np.minimum(low, high), np.maximum(low, high))
+    torque = np.column_stack([torque, np.zeros_like(idle), idle, best, cut])
     return torque, (*labels, *_SPECIAL_LEVELS), spread
 
 

@@ -151,7 +151,14 @@ def _bilinear(grid: EngineGrid, values: Array, torque_nm: Array, speed_radps: Ar
     j = np.clip(np.searchsorted(grid.torque_nm, torque, "right") - 1, 0, len(grid.torque_nm) - 2)
     x = (speed - grid.speed_radps[i]) / (grid.speed_radps[i + 1] - grid.speed_radps[i])
     y = (torque - grid.torque_nm[j]) / (grid.torque_nm[j + 1] - grid.torque_nm[j])
-    low = values[i, j] * (1 - y) + values[i, j + 1] * y
-    high = values[i + 1, j] * (1 - y) + values[i + 1, j + 1] * y
+    result = np.zeros(speed.shape)
+    for corner, weight in (
+        (values[i, j], (1 - x) * (1 - y)),
+        (values[i, j + 1], (1 - x) * y),
+        (values[i + 1, j], x * (1 - y)),
+        (values[i + 1, j + 1], x * y),
+    ):
+        # A corner that was not measured spoils only what leans on it.
+        result += np.where(weight == 0, 0.0, weight * corner)
     outside = (x < 0) | (x > 1) | (y < 0) | (y > 1)
-    return np.where(outside, np.nan, low * (1 - x) + high * x)
+    return np.where(outside, np.nan, result)

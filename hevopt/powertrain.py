@@ -5,7 +5,7 @@ Signs: power > 0 flows towards the wheels; battery power > 0 discharges; brake p
 A control is a joint (couplings.py) and a machine torque. Per step the machine torque runs between what the
 engine's limits and the machine's leave, and the engine delivers the rest; with negative demand the friction
 brakes take what the shafts do not. Always among the levels: both ends (engine at full load and at its lowest
-torque, that is fuel cut or full regeneration), zero torque, battery idle, engine at its best efficiency.
+torque), zero torque, battery idle, engine at its best efficiency, and fuel cut without friction brakes.
 """
 
 from dataclasses import dataclass
@@ -33,6 +33,7 @@ TORQUE_LEVELS = 41
 _TORQUE_TOLERANCE_NM = 1e-6
 _POWER_TOLERANCE_W = 1e-6
 _ROUNDING_W = 1e-9
+_BOOST_SLACK_NM = 1e-3
 _SHORTFALLS_LISTED = 12
 
 
@@ -146,7 +147,7 @@ def _branch(
             Reject.BATTERY_LIMIT,
             ~battery_model.within_limits(architecture.battery, battery_power_w),
         )
-        | _function_rejects(architecture, demand, joint, torques, fuel_kgps, battery_power_w)
+        | _function_rejects(architecture, demand, joint, torques, battery_power_w)
     )
     return _Branch(
         joint, labels, fuel_kgps * step_s, nox_kgps * step_s, battery_power_w, reject, flows
@@ -156,7 +157,8 @@ def _branch(
 def _flows(
     architecture: Architecture, demand: Demand, joint: Joint, torques: Balance, fuel_kgps: Array
 ) -> dict[str, Array]:
-    """Powers, each loss by its own law and not as a difference, so that their balance is a check."""
+    """Powers and losses. Clutch, gears, machine and brakes lose by laws of their own, so that the balances of
+    shafts and car are checks; the engine's loss is what fuel power is not turned into work."""
     engine_speed = joint.engine_speed_radps[:, None]
     machine_speed = joint.machine_speed_radps[:, None]
     wheel_speed = demand.wheel_speed_radps[:, None]
@@ -226,15 +228,14 @@ def _function_rejects(
     demand: Demand,
     joint: Joint,
     torques: Balance,
-    fuel_kgps: Array,
     battery_power_w: Array,
 ) -> Bits:
     """Table 1: what the architecture's functions leave of the physically possible.
 
     start_stop            engine at rest while the car stands
-    power_management      engine at rest or without fuel while the machine drives; assistance
+    power_management      engine at rest, or dragged, while the machine drives; assistance
     nox_cut               assistance by the machine while the engine drives
-    e_boost               assistance only where the engine alone falls short
+    e_boost               assistance only beyond the engine's full load
     regenerative_braking  charging while the car is braked
     Charging by the engine while it runs needs no function: any alternator does that.
     """
@@ -247,12 +248,11 @@ def _function_rejects(
         banned |= ~standing & (not has("power_management"))
     elif not has("power_management"):
         motoring = torques.machine > _TORQUE_TOLERANCE_NM
-        banned |= motoring & (fuel_kgps == 0)
+        banned |= motoring & (torques.engine <= 0)
         if not has("nox_cut"):
-            alone = balance(architecture, demand, joint, np.zeros((len(wanted), 1))).engine
             speed = joint.engine_speed_radps[:, None]
             full = engine_model.full_load_torque_nm(architecture.engine, speed)
-            banned |= motoring & ~(has("e_boost") & (alone > full))
+            banned |= motoring & ~(has("e_boost") & (torques.engine > full - _BOOST_SLACK_NM))
     if not has("regenerative_braking"):
         banned |= (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)
     return _bits(Reject.FUNCTION, banned)

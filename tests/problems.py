@@ -11,7 +11,9 @@ from hevopt import Battery, Control, ControlTable, Problem
 def random_battery(rng: np.random.Generator, curved: bool) -> Battery:
     """A small pack; curved: voltage and resistances over SOC in three segments, else linear voltage."""
     points = np.array([0.0, 0.35, 0.6, 1.0]) if curved else np.array([0.0, 1.0])
-    voltage = np.cumsum(np.concatenate([[rng.uniform(80, 120)], rng.uniform(0, 30, len(points) - 1)]))
+    voltage = np.cumsum(
+        np.concatenate([[rng.uniform(80, 120)], rng.uniform(0, 30, len(points) - 1)])
+    )
     scale = 0.5 * voltage[0] ** 2 / 4 / 2500.0
     shape = len(points) if curved else 1
     discharge, charge = (
@@ -79,7 +81,11 @@ def _drain_w(pack: Battery, power: float, energy: np.ndarray) -> np.ndarray:
     result = np.empty_like(energy)
     for n, stored in enumerate(energy):
         i = min(int(np.sum(stored >= points[1:])), len(points) - 2)
-        a = (pack.open_circuit_v[i + 1] - pack.open_circuit_v[i]) / (pack.soc[i + 1] - pack.soc[i]) / 2
+        a = (
+            (pack.open_circuit_v[i + 1] - pack.open_circuit_v[i])
+            / (pack.soc[i + 1] - pack.soc[i])
+            / 2
+        )
         b, c = pack.open_circuit_v[i], -(stored - points[i]) / pack.capacity_as
         step = -c / b if a == 0 else (-b + np.sqrt(b * b - 4 * a * c)) / (2 * a)
         soc = pack.soc[i] + step

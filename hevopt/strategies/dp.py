@@ -9,7 +9,7 @@ stays meaningful: a gentle one first, and charge beyond a full battery may be th
 dominated choice superfluous. Where the rollout cannot keep what the value function promised, that gentleness
 misled it, and steep prices with all choices follow.
 
-The first grid spans the SOC window; the next ones a band around the path found, each ten times finer.
+The first grid spans the SOC window; the next ones ever narrower bands around the path found.
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,9 @@ from hevopt.strategies._rollout import Reach, reach_of, roll
 
 Array = NDArray[np.float64]
 ENERGY_NODES = 1001
-# Widths of the grids as shares of the SOC window.
-_BANDS = (1.0, 0.1, 0.01)
+# Widths of the grids as shares of the SOC window; finer ones are tried while they gain this share of cost.
+_BANDS = (1.0, 0.1, 0.01, 0.003, 0.001)
+_GAIN_WORTH_MORE = 2e-5
 # Missing charge costs this many times what it is worth.
 _GENTLE, _STEEP = 5.0, 1e4
 # A rollout dearer than promised by this share has been misled.
@@ -82,8 +83,11 @@ def _search(
         path, promise = _solve_on_grid(setting, grid_low, cell, nodes)
         promises.append(promise)
         cost, energy_j = total_cost_kg(problem, choices.control[path])
+        settled = best_cost - cost < _GAIN_WORTH_MORE * abs(cost) and len(promises) > 2
         if cost < best_cost:
             best_cost, best, centre = cost, choices.control[path], energy_j
+        if settled:
+            break
     return best_cost, best, promises[0]
 
 

@@ -1,0 +1,42 @@
+"""Problems that many tests share, built once."""
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+ARCHITECTURES = ("A", "B", "C1", "C2", "D", "E")
+HYBRIDS = ("C1", "C2", "D", "E")
+CYCLES = (
+    "nedc", "wltc_class3b", "udds", "hwfet", "us06", "ftp75", "cadc_urban", "cadc_road",
+    "cadc_motorway130",
+)  # fmt: skip
+
+
+@cache
+def _problem(architecture: str, cycle: str):
+    from hevopt import build_problem, load_architecture, load_cycle
+
+    return build_problem(load_architecture(architecture), load_cycle(cycle), allow_shortfall=True)
+
+
+@cache
+def _comparison(cycle: str):
+    from hevopt import compare
+
+    return compare(cycle, allow_shortfall=True)
+
+
+@pytest.fixture
+def problem_of():
+    """(architecture, cycle) -> problem, cached over the whole run."""
+    return _problem
+
+
+@pytest.fixture
+def comparison_of():
+    """cycle -> comparison of everything on it, cached over the whole run."""
+    return _comparison

@@ -1,0 +1,104 @@
+"""The command line as a user sees it."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import pytest
+
+from hevopt.cli import main
+from hevopt.study import Row
+
+KEYS = """architecture, strategy, status, fuel_l_per_100km, delta_fuel_percent, co2_g_per_km, nox_mg_per_km,
+delta_nox_percent, soc_start, soc_end, delta_energy_percent, fuel_corrected_l_per_100km, engine_starts,
+bound_l_per_100km, gap_percent, certificate, solve_s"""
+
+
+def call(monkeypatch, capsys, *words):
+    """Exit status, standard output and standard error of a command."""
+    monkeypatch.setattr("sys.argv", ["hevopt", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    captured = capsys.readouterr()
+    return stop.value.code or 0, captured.out, captured.err
+
+
+def test_json_has_the_promised_keys_in_order(monkeypatch, capsys):
+    status, out, _ = call(monkeypatch, capsys, "compare", "--architectures", "A,C2", "--json")
+    assert status == 0
+    result = json.loads(out)
+    assert list(result) == ["cycle", "rows"]
+    promised = KEYS.replace("\n", " ").replace(" ", "").split(",")
+    assert list(Row.__dataclass_fields__) == promised
+    assert all(list(row) == promised for row in result["rows"])
+    assert [row["strategy"] for row in result["rows"]] == [
+        "baseline", "conventional", "nox_cut", "ecms", "dp",
+    ]  # fmt: skip
+
+
+def test_the_table_shows_every_row_and_the_published_figures(monkeypatch, capsys):
+    status, out, err = call(monkeypatch, capsys, "compare", "--architectures", "A,B")
+    assert status == 0
+    assert "start_stop" in out and "costate" in out and "published" in out and "-6 %" in out
+    assert "Traceback" not in err
+
+
+def test_run_writes_a_trajectory_whose_columns_add_up_to_the_table(monkeypatch, capsys, tmp_path):
+    path = tmp_path / "traj.csv"
+    words = ("run", "C2", "--strategy", "conventional", "--out", str(path))
+    status, out, _ = call(monkeypatch, capsys, *words)
+    assert status == 0 and "calibration" in out
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 1180
+    litres = sum(float(row["fuel_kg"]) for row in rows) / 0.835 / 11.0282 * 100
+    shown = next(line for line in out.splitlines() if "conventional" in line).split()[2]
+    assert float(shown) == pytest.approx(litres, abs=6e-4)
+    assert max(abs(float(row["residual_whole_car_w"])) for row in rows) < 1e-6
+    assert {"soc", "battery_power_w", "engine_torque_nm", "clutch_loss_w"} <= set(rows[0])
+
+
+def test_cycles_and_architectures_are_listed(monkeypatch, capsys):
+    _, cycles, _ = call(monkeypatch, capsys, "cycles")
+    _, cars, _ = call(monkeypatch, capsys, "architectures")
+    assert "11.03 km" in cycles and len(cycles.splitlines()) == 9
+    assert [line.split()[0] for line in cars.splitlines()] == ["A", "B", "C1", "C2", "D", "E"]
+
+
+def test_a_cycle_the_car_cannot_follow_ends_with_3_unless_shortfall_is_allowed(monkeypatch, capsys):
+    words = ("compare", "--architectures", "A", "--cycle", "us06")
+    status, out, err = call(monkeypatch, capsys, *words)
+    assert status == 3 and "Nm missing" in err and "t = 299 s" in err and "failed" in out
+    status, out, _ = call(monkeypatch, capsys, *words, "--allow-shortfall")
+    assert status == 0 and "shortfall at 1 steps" in out
+
+
+def test_names_and_paths_work_from_any_directory(monkeypatch, capsys, tmp_path):
+    (tmp_path / "mine.csv").write_text("time_s,speed_kmh\n0,0\n10,36\n20,36\n30,0\n")
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine.csv", "./mine.csv", str(tmp_path / "mine.csv"), "nedc"):
+        words = ("compare", "--architectures", "A", "--cycle", name)
+        assert call(monkeypatch, capsys, *words)[0] == 0
+
+
+def test_a_nox_weight_lowers_nox_and_keeps_the_bound_below(monkeypatch, capsys):
+    words = ("compare", "--architectures", "C2", "--strategies", "dp,ecms", "--json", "--nox-weight")
+    plain, priced = (
+        json.loads(call(monkeypatch, capsys, *words, weight)[1])["rows"] for weight in ("0", "30")
+    )
+    for before, after in zip(plain, priced, strict=True):
+        assert after["nox_mg_per_km"] < 0.9 * before["nox_mg_per_km"]
+        assert after["fuel_l_per_100km"] > before["fuel_l_per_100km"]
+        assert after["gap_percent"] >= 0
+
+
+def test_help_loads_no_compiled_part():
+    code = "import sys, hevopt.cli; sys.exit('numba' in sys.modules or 'numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_a_closed_pipe_is_not_an_error_message():
+    command = f"{sys.executable} -m hevopt.cli cycles | head -1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True)
+    assert "Traceback" not in done.stderr and "cadc_motorway130" in done.stdout

@@ -1,0 +1,60 @@
+"""Everything the README tells a reader to run is run, and what it shows is what is printed."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hevopt.cli import main
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+SHELL = [
+    line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines()
+]
+COMMANDS = [line for line in SHELL if line.startswith("hevopt ")]
+SET_UPS = [line for line in SHELL if not line.startswith("hevopt ")]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command_of_the_readme_works(command, monkeypatch, tmp_path, capsys):
+    for folder in ("architectures", "cycles"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", shlex.split(command))
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert not stop.value.code, capsys.readouterr().err
+
+
+def test_python_example_of_the_readme_works():
+    (example,) = re.findall(r"```python\n(.*?)```", README, re.S)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", example], capture_output=True, text=True
+    )
+    assert re.fullmatch(r"0\.2\d+ kg, at least 0\.2\d+ kg \(\w+ \w+\)\n", done.stdout), done.stderr
+
+
+def test_set_up_commands_are_the_two_that_ci_and_this_suite_were_started_with():
+    assert len(SET_UPS) == 2
+    assert SET_UPS[0].endswith("pip install . && hevopt compare")
+    assert SET_UPS[1].endswith('pip install -e ".[test]" && pytest')
+    assert "grep -m1 'pytest$' README.md" in (ROOT / ".ci" / "run").read_text()
+
+
+def test_the_table_shown_is_the_table_printed(comparison_of):
+    shown = {}
+    strategies = {row.strategy for row in comparison_of("nedc").rows}
+    for line in README.splitlines():
+        words = line.split()
+        if len(words) > 10 and words[1] in strategies:
+            shown[words[0], words[1]] = words[2:]
+    rows = comparison_of("nedc").rows
+    assert set(shown) == {(row.architecture, row.strategy) for row in rows}
+    for row in rows:
+        words = shown[row.architecture, row.strategy]
+        assert float(words[0]) == pytest.approx(row.fuel_l_per_100km, abs=2e-3)
+        assert float(words[9]) == pytest.approx(row.bound_l_per_100km, abs=2e-3)

@@ -1,0 +1,99 @@
+"""The shape of the house: imports go down only, public names are exact, data files name their sources."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import hevopt
+
+PACKAGE = Path(hevopt.__file__).parent
+ROOT = Path(__file__).parents[1]
+
+# From the bottom up; a module may import from its own row or rows above it in this list, never below.
+LAYERS = [
+    ["errors", "units"],
+    ["files"],
+    ["datafile", "cycle"],
+    ["_battery_kernels"],
+    ["vehicle", "engine", "machine", "battery", "transmission"],
+    ["architecture", "problem"],
+    ["demand", "_choices_kernels", "_prices_kernels", "_certificate_kernels"],
+    ["driver", "choices"],
+    ["couplings", "prices", "simulation"],
+    ["balance"],
+    ["powertrain"],
+    ["strategies"],
+    ["certificate"],
+    ["study"],
+    ["published"],
+    ["report"],
+    ["cli"],
+]
+STRATEGIES_MAY_SEE = {
+    "errors", "problem", "simulation", "choices", "prices", "_prices_kernels", "battery",
+    "_battery_kernels", "strategies",
+}  # fmt: skip
+
+
+def imports_of(path: Path) -> set[str]:
+    """First part below `hevopt` of every project import in a file."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if (
+            isinstance(node, ast.ImportFrom)
+            and node.module
+            and node.module.split(".")[0] == "hevopt"
+        ):
+            parts = node.module.split(".")
+            found |= {parts[1]} if len(parts) > 1 else {alias.name for alias in node.names}
+        elif isinstance(node, ast.Import):
+            names = [a.name.split(".") for a in node.names]
+            found |= {n[1] for n in names if n[0] == "hevopt" and len(n) > 1}
+    return found - {"__version__"}
+
+
+def layer_of(name: str) -> int:
+    return next(i for i, row in enumerate(LAYERS) if name in row)
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.glob("*.py")), ids=lambda p: p.stem)
+def test_modules_import_downwards_only(path):
+    if path.stem == "__init__":
+        return
+    for name in imports_of(path):
+        assert layer_of(name) < layer_of(path.stem), f"{path.stem} imports {name}"
+
+
+@pytest.mark.parametrize(
+    "path", sorted((PACKAGE / "strategies").glob("*.py")), ids=lambda p: p.stem
+)
+def test_strategies_see_the_problem_and_never_a_car(path):
+    assert imports_of(path) <= STRATEGIES_MAY_SEE
+
+
+def test_public_names_are_exact_and_load():
+    assert len(set(hevopt.__all__)) == len(hevopt.__all__)
+    for name in hevopt.__all__:
+        value = getattr(hevopt, name)
+        assert not isinstance(value, type(hevopt)), f"{name} is a module"
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted([*ROOT.glob("architectures/**/*.toml"), *ROOT.glob("cycles/*.csv")]),
+    ids=lambda p: p.name,
+)
+def test_data_files_name_source_and_licence(path):
+    comments = " ".join(line for line in path.read_text().splitlines() if "#" in line)
+    assert "icence" in comments or "MIT" in comments
+    assert re.search(r"\[[SFE]\]|Source|Millo", comments)
+
+
+def test_no_file_is_read_when_hevopt_is_imported():
+    import subprocess
+    import sys
+
+    code = "import sys, hevopt; sys.exit(any(m.startswith('numba') for m in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
