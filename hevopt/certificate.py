@@ -1,40 +1,29 @@
 """Certificates: how little any plan could cost on the same problem, with the kind of proof.
 
-With prices p_1 ... p_T >= 0 on stored energy x_1 ... x_T and the step x_t+1 = x_t - r_t(x_t, u), Lagrange duality
-gives, for every choice of prices, a bound on every feasible plan:
+A ladder of proofs, each dearer than the one before; it is climbed only while the rollout's gap is above a target.
 
-    g(p) = sum over t of  min over u, x of [cost_t(u) + p_t+1 r_t(x, u) + (p_t - p_t+1) x]  + switching
-           + p_T x_end - p_1 x_start
+    one multiplier   one price on stored energy (prices.py)
+    costate prices   a price per step, from the costate equation along the rollout (step_prices.py)
+    LP prices        a price per step, from a linear program, where the rollout touches the window (step_prices.py)
+    lower-bound DP   a cost-to-go that is nowhere above the true one, for costs of switching (lower_dp.py)
 
-with x within the SOC window (t = 0: x = x_start and no x term), and the switching costs exact, a shortest path
-over modes. Every rung is one shape of p, scaled to the maximum of g.
-
-    one multiplier    p constant; r at its least over the window (prices.py)
-    costate prices    p_t = p_t+1 (1 - dr_t/dx) along a rollout: then x is stationary where the rollout is
-
-The inner minimum over x. Where resistance is constant and Uoc linear in SOC within the window, r is convex in x:
-with r = U I, D = sqrt(U² - 4 R P), dr/dU = -2 R I² / D <= 0 rises with U, and U² is linear in x, so U is concave
-in x and r falls in U: a convex falling function of a concave one. Tangents at the window's ends and at the
-rollout lie below it, and the least of their upper envelope below its minimum. For other batteries the window is
-cut into cells; in each, r is at least its value at the cell's highest voltage and lowest resistance.
-
-A bound holds for the tabulated controls, for every strategy alike, and for end charges other than the problem's
-own: g moves with x_end by p_T.
+A bound holds for the tabulated controls, for every strategy alike. The first three hold for every end charge, moving
+with it by their price at the end; the last one for the asked end charge or more.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hevopt import _certificate_kernels as kernels
-from hevopt import battery as battery_model
-from hevopt.choices import choices_of, without_dominated
-from hevopt.prices import Line, dual, one_price_dual
+from hevopt.lower_dp import lower_bound_kg
+from hevopt.prices import Line, one_price_dual
 from hevopt.problem import Problem, Trajectory
+from hevopt.step_prices import costate_dual, lp_dual
 
-Array = NDArray[np.float64]
-_CELLS = 256
+TARGET_GAP = 5e-4
+LOWER_DP_NODES = (16_001, 64_001)
+# Share of the window within which a rollout counts as touching its end.
+_TOUCH = 2e-3
 # Sums of some thousand terms: a bound is lowered by what rounding could have added.
 _ROUNDING = 1e-12
 
@@ -44,19 +33,24 @@ class Certificate:
     """Bounds on cost (kg: fuel, plus weighted NOx) for any end charge, as supporting lines.
 
     proofs: kind of proof -> its lines; the highest line at an end charge is the bound there
+    at_least: kind of proof -> bound for end charges of end_min_j or more
     """
 
     end_min_j: float
     proofs: dict[str, list[Line]]
+    at_least: dict[str, float] = field(default_factory=dict)
 
     def bound_kg(self, end_j: float) -> tuple[float, str]:
         """The highest proven bound for plans that end with at least `end_j`, and its kind of proof."""
         extra_j = end_j - self.end_min_j
-        best, kind = max(
+        bounds = [
             (line.value_kg + line.price_kgpj * extra_j, kind)
             for kind, lines in self.proofs.items()
             for line in lines
-        )
+        ]
+        if extra_j >= 0:
+            bounds += [(bound, kind) for kind, bound in self.at_least.items()]
+        best, kind = max(bounds)
         return best - _ROUNDING * abs(best), kind
 
     @property
@@ -66,51 +60,47 @@ class Certificate:
         return max(lines, key=lambda line: line.value_kg).price_kgpj
 
 
-def certify(problem: Problem, rollout: Trajectory | None = None) -> Certificate:
-    """The certificate of a problem; with a rollout, its costate prices too."""
-    proofs = {"one multiplier": one_price_dual(problem)}
-    if rollout is not None:
-        proofs["costate prices"] = costate_dual(problem, rollout)
-    return Certificate(problem.end_min_j, proofs)
+def certify(
+    problem: Problem, rollout: Trajectory | None = None, *, target_gap: float = TARGET_GAP
+) -> Certificate:
+    """The certificate of a problem; with a rollout, up to the rung that brings its gap below `target_gap`."""
+    certificate = Certificate(problem.end_min_j, {"one multiplier": one_price_dual(problem)})
+    if rollout is None:
+        return certificate
+    worth = certificate.price_kgpj
+    for kind, climb in _rungs(problem, rollout, certificate, worth):
+        if _gap(certificate, rollout) <= target_gap:
+            break
+        climb(kind)
+    return certificate
 
 
-def costate_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
-    """Lines of the dual whose prices follow the costate equation along a rollout."""
-    choices = without_dominated(choices_of(problem))
-    pack, step_s = problem.battery, problem.table.step_s
-    price = kernels.costate(rollout.energy_j, rollout.battery_power_w, step_s, pack.arrays)
+def _rungs(
+    problem: Problem, rollout: Trajectory, certificate: Certificate, worth_kgpj: float
+) -> list[tuple[str, Callable[[str], None]]]:
+    """Kinds of proof beyond the first, in order of effort, and what adds each to the certificate."""
+
+    def lines(shape: Callable[[Problem, Trajectory], list[Line]], kind: str) -> None:
+        certificate.proofs[kind] = shape(problem, rollout)
+
+    def lower(nodes: int, kind: str) -> None:
+        bound = lower_bound_kg(problem, worth_kgpj, nodes=nodes)
+        certificate.at_least[kind] = max(bound, certificate.at_least.get(kind, bound))
+
+    rungs = [("costate prices", partial(lines, costate_dual))]
+    if _touches_window(problem, rollout):
+        rungs.append(("LP prices", partial(lines, lp_dual)))
+    return rungs + [("lower-bound DP", partial(lower, nodes)) for nodes in LOWER_DP_NODES]
+
+
+def _touches_window(problem: Problem, rollout: Trajectory) -> bool:
     low, high = problem.window_j
-    arguments = choices.first, choices.power_w, step_s, price, rollout.energy_j
-    if convex_in_energy(problem):
-        worth = kernels.worth_by_tangents(*arguments, low, high, pack.arrays)
-    else:
-        worth = kernels.worth_by_cells(*arguments, *_cells(problem), pack.arrays)
-    constant = price[-1] * problem.end_min_j - price[0] * problem.start_j
-    return dual(problem, choices, worth, constant, float(price[-1]))
-
-
-def convex_in_energy(problem: Problem) -> bool:
-    """Whether resistance is constant and the voltage linear in SOC throughout the window."""
-    pack = problem.battery
-    first = int(np.searchsorted(pack.soc, pack.soc_min, "right")) - 1
-    last = int(np.searchsorted(pack.soc, pack.soc_max, "left"))
-    inside = slice(first, last + 1)
-    slopes = np.diff(pack.open_circuit_v[inside]) / np.diff(pack.soc[inside])
-    same = [np.ptp(r[inside]) == 0 for r in (pack.discharge_ohm, pack.charge_ohm)]
-    return all(same) and bool(np.ptp(slopes) <= 1e-12 * (1 + np.abs(slopes).max()))
-
-
-def _cells(problem: Problem) -> tuple[Array, Array, Array, Array]:
-    """Edges (cell + 1,) over the window, with every point of the curves among them, and per cell the highest
-    voltage and the lowest discharge and charge resistance."""
-    pack = problem.battery
-    edges_soc = np.union1d(
-        np.linspace(pack.soc_min, pack.soc_max, _CELLS + 1),
-        pack.soc[(pack.soc > pack.soc_min) & (pack.soc < pack.soc_max)],
+    margin = _TOUCH * (high - low)
+    return bool(
+        (rollout.energy_j < low + margin).any() or (rollout.energy_j > high - margin).any()
     )
-    voltage, discharge, charge = (
-        np.interp(edges_soc, pack.soc, curve)
-        for curve in (pack.open_circuit_v, pack.discharge_ohm, pack.charge_ohm)
-    )
-    lower = [np.minimum(r[1:], r[:-1]) for r in (discharge, charge)]
-    return battery_model.energy_j(pack, edges_soc), voltage[1:], *lower
+
+
+def _gap(certificate: Certificate, rollout: Trajectory) -> float:
+    bound, _ = certificate.bound_kg(rollout.end_j)
+    return (rollout.cost_kg - bound) / max(abs(bound), 1e-300)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.battery import Battery, energy_j
+from hevopt.battery import Battery, energy_j, within_limits
 from hevopt.errors import DataError
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ class Reject(IntFlag):
     NO_PATH = 64
     FUNCTION = 128
     DUPLICATE = 256
+    GIVEN = 512
 
 
 REJECT_WORDS: dict[Reject, str] = {
@@ -42,6 +43,7 @@ REJECT_WORDS: dict[Reject, str] = {
     Reject.NO_PATH: "torque does not reach the wheels",
     Reject.FUNCTION: "function not in the architecture",
     Reject.DUPLICATE: "same as another control",
+    Reject.GIVEN: "marked as not feasible",
 }
 
 
@@ -89,6 +91,53 @@ class ControlTable:
     signals: Signals | None = None
     flows: Mapping[str, Array] = field(default_factory=dict)
     missing_torque_nm: Array | None = None
+
+    @classmethod
+    def from_arrays(
+        cls,
+        fuel_kg: Array,
+        battery_power_w: Array,
+        feasible: NDArray[np.bool_] | None = None,
+        *,
+        step_s: float | Array = 1.0,
+        nox_kg: Array | None = None,
+        mode: NDArray[np.int64] | None = None,
+        switch_fuel_kg: Array | None = None,
+        switch_allowed: NDArray[np.bool_] | None = None,
+    ) -> "ControlTable":
+        """A table from (time, control) arrays alone: any cost in kg, battery power, and what can be used.
+
+        Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is
+        one, and nothing costs to switch; with it, `switch_fuel_kg` is (mode, mode), by default 0.
+        Raises DataError where shapes do not agree or usable entries are not finite.
+        """
+        fuel, power = np.array(fuel_kg, dtype=float), np.array(battery_power_w, dtype=float)
+        if fuel.ndim != 2 or power.shape != fuel.shape:
+            raise DataError(
+                f"fuel_kg and battery_power_w must be one shape (time, control); found {fuel.shape} "
+                f"and {power.shape}"
+            )
+        usable = np.ones(fuel.shape, bool) if feasible is None else np.array(feasible, dtype=bool)
+        nox = np.zeros_like(fuel) if nox_kg is None else np.array(nox_kg, dtype=float)
+        if usable.shape != fuel.shape or nox.shape != fuel.shape:
+            raise DataError(f"feasible and nox_kg must have the shape of fuel_kg, {fuel.shape}")
+        steps = np.broadcast_to(np.asarray(step_s, dtype=float), fuel.shape[:1]).copy()
+        modes = np.zeros(fuel.shape[1], np.int64) if mode is None else np.array(mode, np.int64)
+        count = int(modes.max()) + 1
+        switch = np.zeros((count, count)) if switch_fuel_kg is None else np.array(switch_fuel_kg)
+        allowed = np.ones(switch.shape, bool) if switch_allowed is None else np.array(switch_allowed)
+        return cls(
+            time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
+            step_s=steps,
+            fuel_kg=np.where(usable, fuel, 0.0),
+            nox_kg=np.where(usable, nox, 0.0),
+            battery_power_w=np.where(usable, power, 0.0),
+            reject=np.where(usable, 0, int(Reject.GIVEN)).astype(np.uint16),
+            mode=modes,
+            switch_fuel_kg=switch,
+            switch_allowed=allowed,
+            controls=tuple(Control(True, 0, str(c)) for c in range(fuel.shape[1])),
+        )
 
     def __post_init__(self) -> None:
         self._check_shapes()
@@ -148,6 +197,7 @@ class Problem:
     soc_end_min: state of charge that must at least be left at the end
     start_mode: mode before the first step
     nox_weight: kg of fuel that a kg of NOx counts
+    A control whose power the battery cannot deliver or take at every state of charge of its window is rejected.
     """
 
     table: ControlTable
@@ -171,6 +221,11 @@ class Problem:
             raise DataError(
                 f"start_mode {self.start_mode}; allowed: 0 to {len(self.table.switch_fuel_kg) - 1}"
             )
+        beyond = ~within_limits(self.battery, self.table.battery_power_w)
+        if (self.table.feasible & beyond).any():
+            bits = np.where(beyond, np.uint16(Reject.BATTERY_LIMIT), np.uint16(0))
+            table = replace(self.table, reject=self.table.reject | bits)
+            object.__setattr__(self, "table", table)
 
     @property
     def cost_kg(self) -> Array:

@@ -1,4 +1,4 @@
-"""Compiled parts of the certificates; the mathematics is in certificate.py."""
+"""Compiled parts of the duals with a price per step; the mathematics is in step_prices.py."""
 
 import numpy as np
 from numba import njit
@@ -98,3 +98,16 @@ def worth_by_cells(
                 best = min(best, after * step_s[k] * drain + tilt * x)
             worth[i] = best
     return worth
+
+
+@njit(cache=True)
+def linear_steps(first, power, step_s, energy, rollout_power, battery):
+    """Fall of energy of every entry at the rollout, (entry,), and the share of x a step keeps, (time,)."""
+    drain = np.empty(len(power))
+    keep = np.empty(len(step_s))
+    for k in range(len(step_s)):
+        _, slope = drain_and_slope(rollout_power[k], energy[k], battery)
+        keep[k] = 1.0 - step_s[k] * slope
+        for i in range(first[k, 0], first[k, -1]):
+            drain[i] = step_s[k] * drain_and_slope(power[i], energy[k], battery)[0]
+    return drain, keep

@@ -1,0 +1,91 @@
+"""Lower-bound dynamic programming: a cost-to-go that is nowhere above the true one.
+
+Claim. Let V be piecewise linear on an even grid of stored energy x, non-increasing, and below the true cost-to-go
+after the step, and let every choice u of a mode move x by d_u(x), cost f_u. Then a piecewise linear W on the same
+grid can be computed that is non-increasing and below  min over u of f_u + V(x + d_u(x))  everywhere.
+
+1. Shift. Within cell i, between nodes i and i + 1, replace d_u(x) by a constant s_u,i at least as great. V does not
+   increase, so h_u(x) = f_u + V(x + s_u,i) is below the true branch. s_u,i comes from an upper bound of d_u that is
+   linear in x over a piece of the window and rises with x, taken at the cell's right end: a tangent where r = -d / dt
+   is convex in x (step_prices.py), else the constant of the piece's highest voltage and lowest resistance.
+2. Nodes. W_i is the least over u of h_u at node i, under the shift of the cell to its right, and at the right end of
+   a piece also of the cell to its left. Greater shifts give smaller values, so W_i is below h_u under both.
+3. Breaks. V has its breaks at nodes, so with a constant shift k + a (0 <= a < 1) h_u has one break in the cell, a
+   distance 1 - a from its left node, where its target is node i + k + 1 and its value f_u + V_i+k+1. Between nodes
+   and break h_u is linear. So the straight line from W_i to W_i+1 is above h_u by at most
+       delta_i = max over u of (a W_i + (1 - a) W_i+1 - f_u - V_i+k+1)+
+   and lowering node i by the larger of delta_i-1 and delta_i puts the line below every h_u.
+4. Order. Taking at each node the least of itself and the nodes to its left only lowers W, and makes it
+   non-increasing. The true cost-to-go does not increase either, as charge may be thrown away.
+5. Modes. The least over modes of switching cost + W is concave in each cell wherever modes cross, so the line
+   between its nodes is below it: no further correction.
+6. Ends. Above the top node V is constant: what does not fit is thrown away, a relaxation. Below the bottom node,
+   and for charge missing at the end, V rises with a steep but finite slope: a relaxation too, for infinity is above it.
+
+By induction from the end V at the first step, at the start's energy and mode, is below the cost of every plan that
+ends with at least the asked charge.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt import _lower_dp_kernels as kernels
+from hevopt.choices import Choices, choices_of, without_dominated
+from hevopt.problem import Problem
+from hevopt.step_prices import convex_in_energy, window_cells
+
+Array = NDArray[np.float64]
+NODES = 4001
+_PIECES = 16
+_PIECES_CURVED = 256
+# Slope below the window and for missing end charge, in multiples of what charge is worth.
+_STEEPNESS = 4.0
+
+
+def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int = NODES) -> float:
+    """A bound on the cost of every plan that ends with at least the asked charge.
+
+    price_kgpj: about what stored energy is worth; it sets the slope of the relaxation, any value is valid.
+    """
+    choices = without_dominated(choices_of(problem))
+    low, high = problem.window_j
+    cell = (high - low) / (nodes - 1)
+    # The asked end charge is a node, and the grid reaches up to a cell beyond the window: a relaxation.
+    below = np.ceil((problem.end_min_j - low) / cell - 1e-9)
+    grid = problem.end_min_j + cell * (np.arange(nodes + 1) - below)
+    slope = _STEEPNESS * max(price_kgpj, 1e-12)
+    terminal = slope * np.maximum(problem.end_min_j - grid, 0.0)
+    breaks, offset, rise = _move_bounds(problem, choices, grid, cell)
+    value = kernels.lower_backward(
+        choices.first, choices.cost_kg, choices.switch_kg, choices.switch_allowed, terminal,
+        breaks, offset, rise, slope * cell, _unreachable_kg(choices, terminal),
+    )  # fmt: skip
+    return float(np.interp(problem.start_j, grid, value[problem.start_mode]))
+
+
+def _move_bounds(
+    problem: Problem, choices: Choices, grid: Array, cell: float
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Nodes that part the window into pieces, and per entry and piece an upper bound of its move in cells:
+    offset + rise x node."""
+    pieces = _PIECES if convex_in_energy(problem) else _PIECES_CURVED
+    pieces = min(pieces, (len(grid) - 1) // 2)
+    breaks = np.arange(pieces + 1) * (len(grid) - 1) // pieces
+    if convex_in_energy(problem):
+        offset, rise = kernels.moves_by_tangents(
+            choices.first, choices.power_w, choices.step_s, grid[0], cell, breaks,
+            problem.battery.arrays,
+        )  # fmt: skip
+        return breaks, offset, rise
+    edges, *best = window_cells(problem, pieces)
+    offset = kernels.moves_by_cells(
+        choices.first, choices.power_w, choices.step_s, cell, grid[breaks], edges, *best,
+        problem.battery.coulombic_efficiency,
+    )  # fmt: skip
+    return breaks, offset, np.zeros_like(offset)
+
+
+def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:
+    """More than any path can cost."""
+    worst_step = float(choices.cost_kg.max(initial=0.0)) + float(choices.switch_kg.max())
+    return worst_step * choices.steps + 2.0 * float(terminal_kg.max()) + 1e-3
