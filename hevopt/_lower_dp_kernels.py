@@ -71,7 +71,9 @@ def _run_end(low, high, start, rise, whole):
 
 
 @njit(cache=True)
-def lower_backward(first, cost, switch_kg, allowed, terminal, breaks, offset, rise, floor_kg, unreachable_kg):
+def lower_backward(
+    first, cost, switch_kg, allowed, terminal, breaks, offset, rise, floor_kg, unreachable_kg
+):
     """(mode, node) lower bound of the cost-to-go before the first step."""
     steps, modes, nodes = first.shape[0], first.shape[1] - 1, len(terminal)
     pieces = len(breaks) - 1
@@ -108,7 +110,9 @@ def lower_backward(first, cost, switch_kg, allowed, terminal, breaks, offset, ri
                             end = _run_end(low, high, start, rise[i, b], whole)
                             ahead = padded[n, pad + low + whole : pad + end + whole + 1]
                             if task == 0:
-                                _lower_nodes(best[n, low:end], ahead, cost[i], start - whole, rise[i, b])
+                                _lower_nodes(
+                                    best[n, low:end], ahead, cost[i], start - whole, rise[i, b]
+                                )
                                 if end == breaks[b + 1]:
                                     # The piece's last node, under the move of the cell to its left.
                                     share = start - whole + rise[i, b] * (end - 1 - low)

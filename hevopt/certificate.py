@@ -96,9 +96,7 @@ def _rungs(
 def _touches_window(problem: Problem, rollout: Trajectory) -> bool:
     low, high = problem.window_j
     margin = _TOUCH * (high - low)
-    return bool(
-        (rollout.energy_j < low + margin).any() or (rollout.energy_j > high - margin).any()
-    )
+    return bool((rollout.energy_j < low + margin).any() or (rollout.energy_j > high - margin).any())
 
 
 def _gap(certificate: Certificate, rollout: Trajectory) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hevopt import battery as battery_model
 from hevopt._prices_kernels import shortest_path
-from hevopt.choices import Choices, choices_of, without_dominated
+from hevopt.choices import Choices, choices_of
 from hevopt.errors import InfeasibleError, SolverError
 from hevopt.problem import Problem
 
@@ -62,7 +62,7 @@ def step_of_entry(choices: Choices) -> Array:
 
 def one_price_dual(problem: Problem) -> list[Line]:
     """Supporting lines of g up to its maximum; the best one comes last."""
-    choices = without_dominated(choices_of(problem))
+    choices = choices_of(problem)
     drain_j = least_drain_j(problem, choices)
     return dual(problem, choices, drain_j, problem.end_min_j - problem.start_j, 1.0)
 

@@ -125,7 +125,9 @@ class ControlTable:
         modes = np.zeros(fuel.shape[1], np.int64) if mode is None else np.array(mode, np.int64)
         count = int(modes.max()) + 1
         switch = np.zeros((count, count)) if switch_fuel_kg is None else np.array(switch_fuel_kg)
-        allowed = np.ones(switch.shape, bool) if switch_allowed is None else np.array(switch_allowed)
+        allowed = (
+            np.ones(switch.shape, bool) if switch_allowed is None else np.array(switch_allowed)
+        )
         return cls(
             time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
             step_s=steps,

@@ -78,7 +78,12 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     # Columns: weight of every choice, then x_1 ... x_T. Rows: energy steps, then sums of weights.
     rows = np.concatenate([step, np.arange(steps), np.arange(1, steps), steps + step])
     columns = np.concatenate(
-        [np.arange(entries), entries + np.arange(steps), entries + np.arange(steps - 1), np.arange(entries)]
+        [
+            np.arange(entries),
+            entries + np.arange(steps),
+            entries + np.arange(steps - 1),
+            np.arange(entries),
+        ]
     )
     scale_j = high - low
     data = np.concatenate([drain_j / scale_j, np.ones(steps), -keep_j[1:], np.ones(entries)])

@@ -1,12 +1,8 @@
 """Problems that many tests share, built once."""
 
-import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 ARCHITECTURES = ("A", "B", "C1", "C2", "D", "E")
 HYBRIDS = ("C1", "C2", "D", "E")

@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -19,11 +21,11 @@ LAYERS = [
     ["_battery_kernels"],
     ["vehicle", "engine", "machine", "battery", "transmission"],
     ["architecture", "problem"],
-    ["demand", "_choices_kernels", "_prices_kernels", "_certificate_kernels"],
+    ["demand", "_choices_kernels", "_prices_kernels", "_step_prices_kernels"],
     ["driver", "choices"],
-    ["couplings", "prices", "simulation"],
-    ["balance"],
-    ["powertrain"],
+    ["couplings", "prices", "simulation", "_lower_dp_kernels"],
+    ["balance", "step_prices"],
+    ["powertrain", "lower_dp"],
     ["strategies"],
     ["certificate"],
     ["study"],
@@ -91,9 +93,13 @@ def test_data_files_name_source_and_licence(path):
     assert re.search(r"\[[SFE]\]|Source|Millo", comments)
 
 
-def test_no_file_is_read_when_hevopt_is_imported():
-    import subprocess
-    import sys
+@pytest.mark.parametrize("words", ["check", "format --check"])
+def test_code_is_formatted_and_free_of_lint(words):
+    command = [sys.executable, "-m", "ruff", *words.split(), "--no-cache", "hevopt", "tests"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
 
+
+def test_importing_hevopt_loads_no_compiled_part():
     code = "import sys, hevopt; sys.exit(any(m.startswith('numba') for m in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

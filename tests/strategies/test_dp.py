@@ -1,20 +1,35 @@
 """Dynamic programming against plain NumPy, against a formula, and under finer grids."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from problems import random_problem
 
-from hevopt import Battery, Control, ControlTable, Problem, simulate
+from hevopt import (
+    Battery,
+    Control,
+    ControlTable,
+    InfeasibleError,
+    Problem,
+    certify,
+    simulate,
+)
 from hevopt._battery_kernels import chemical_power_at
 from hevopt.choices import choices_of
 from hevopt.strategies import _rollout_kernels as kernels
-from hevopt.strategies import dp
+from hevopt.strategies import dp, ecms
 
 
-def plain_backward(choices, terminal, grid_low, cell, floor_kg, ceiling_kg, unreachable_kg, pack):
-    """The same recursion, node by node and without the shift: the exact step, then interpolation."""
+def plain_backward(
+    choices, terminal, grid_low, cell, floor_kg, ceiling_kg, unreachable_kg, pack, pieces
+):
+    """The same recursion, node by node: the battery's step at `pieces` + 1 nodes, linear between, or everywhere."""
     steps, modes = choices.steps, choices.modes
     nodes = np.arange(len(terminal))
+    breaks = nodes if pieces is None else np.arange(pieces + 1) * (len(nodes) - 1) // pieces
     value = np.empty((steps + 1, modes, len(nodes)))
     value[steps] = terminal
     for k in range(steps - 1, -1, -1):
@@ -22,10 +37,11 @@ def plain_backward(choices, terminal, grid_low, cell, floor_kg, ceiling_kg, unre
         grid = grid_low[k] + cell * nodes
         for m in range(modes):
             for i in range(choices.first[k, m], choices.first[k, m + 1]):
-                drain = np.array(
-                    [chemical_power_at(choices.power_w[i], e, pack.arrays) for e in grid]
-                )
-                place = (grid - choices.step_s[k] * drain - grid_low[k + 1]) / cell
+                drain = [
+                    chemical_power_at(choices.power_w[i], grid[b], pack.arrays) for b in breaks
+                ]
+                moved = grid - choices.step_s[k] * np.interp(nodes, breaks, drain)
+                place = (moved - grid_low[k + 1]) / cell
                 total = choices.cost_kg[i] + np.interp(place, nodes, value[k + 1, m])
                 total += floor_kg * np.maximum(-place, 0)
                 total += ceiling_kg * np.maximum(place - nodes[-1], 0)
@@ -37,31 +53,22 @@ def plain_backward(choices, terminal, grid_low, cell, floor_kg, ceiling_kg, unre
     return value
 
 
-@pytest.mark.parametrize("seed", [0, 2, 4, 10])
 @pytest.mark.parametrize("ceiling", [0.0, 2e-4])
-def test_kernel_agrees_with_its_plain_twin_where_the_move_does_not_depend_on_charge(seed, ceiling):
+@pytest.mark.parametrize("seed", range(8))
+def test_kernel_agrees_with_its_plain_twin(seed, ceiling):
     problem = random_problem(seed)
+    pieces = 24 if len(problem.battery.soc) > 2 else 1
+    assert kernels._PIECES == 24
+    compare_with_twin(problem, ceiling, pieces, 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_linear_moves_agree_with_the_exact_step_to_their_curvature(seed):
+    compare_with_twin(random_problem(seed), 0.0, None, 5e-3)
+
+
+def compare_with_twin(problem, ceiling, pieces, tolerance):
     pack = problem.battery
-    flat = Battery(
-        pack.soc,
-        np.full(2, 150.0),
-        pack.discharge_ohm,
-        pack.charge_ohm,
-        pack.capacity_as,
-        0.95,
-        0.2,
-        0.9,
-    )
-    compare_with_twin(problem, flat, ceiling, 1e-9)
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
-def test_kernel_agrees_with_its_plain_twin_to_the_curvature_of_the_move(seed):
-    problem = random_problem(seed)
-    compare_with_twin(problem, problem.battery, 0.0, 5e-3)
-
-
-def compare_with_twin(problem, pack, ceiling, tolerance):
     problem = Problem(problem.table, pack, 0.5, 0.5)
     choices = choices_of(problem)
     low, high = problem.window_j
@@ -72,9 +79,8 @@ def compare_with_twin(problem, pack, ceiling, tolerance):
         choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
         choices.switch_allowed, terminal, grid_low, cell, 1e-4, ceiling, 1.0, pack.arrays,
     )  # fmt: skip
-    plain = plain_backward(choices, terminal, grid_low, cell, 1e-4, ceiling, 1.0, pack)
-    scale = np.ptp(plain[plain < 0.9])
-    assert np.max(np.abs(fast - plain)) <= tolerance * scale
+    plain = plain_backward(choices, terminal, grid_low, cell, 1e-4, ceiling, 1.0, pack, pieces)
+    assert np.max(np.abs(fast - plain)) <= tolerance * np.ptp(plain[plain < 0.9])
 
 
 def quadratic_problem(steps: int, levels: int) -> Problem:
@@ -150,3 +156,70 @@ def test_order_of_controls_does_not_matter():
     )
     costs = [simulate(p, dp.solve(p).control).cost_kg for p in (problem, other)]
     assert costs[0] == pytest.approx(costs[1], rel=1e-13)
+
+
+def test_same_bits_with_one_and_two_threads(tmp_path):
+    code = (
+        "from hevopt import *; p = build_problem(load_architecture('C2'), load_cycle('hwfet')); "
+        "t = simulate(p, solve(p).control); "
+        "print(t.total_fuel_kg.hex(), t.end_j.hex(), certify(p, t).bound_kg(t.end_j)[0].hex())"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", code], env=os.environ | {"NUMBA_NUM_THREADS": count},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for count in ("1", "2")
+    ]  # fmt: skip
+    assert said[0] == said[1] and said[0].count("0x") == 3
+
+
+def chain(steps=4, **changes):
+    """A small table of two modes that can only lose charge, or as changed."""
+    arrays = {
+        "fuel_kg": np.full((steps, 2), 1e-4),
+        "battery_power_w": np.tile([500.0, 900.0], (steps, 1)),
+        "mode": np.array([0, 1]),
+        "switch_allowed": np.ones((2, 2), dtype=bool),
+        "switch_fuel_kg": np.zeros((2, 2)),
+    } | changes
+    battery = Battery(
+        np.array([0.0, 1.0]), np.full(2, 100.0), np.zeros(2), np.zeros(2), 100.0, 1.0, 0.3, 0.9
+    )
+    return Problem(ControlTable.from_arrays(**arrays), battery, 0.5, 0.35)
+
+
+@pytest.mark.parametrize("solve", [dp.solve, ecms.solve], ids=["dp", "ecms"])
+def test_a_problem_without_solution_names_the_first_step_and_the_reason(solve):
+    with pytest.raises(InfeasibleError, match=r"SOC 0\.3500 is asked, 0\.3000"):
+        solve(chain())
+    with pytest.raises(
+        InfeasibleError, match=r"nothing is reachable after step 4 .*leave the SOC window"
+    ):
+        solve(chain(6))
+    feasible = np.ones((4, 2), dtype=bool)
+    feasible[2] = False
+    with pytest.raises(InfeasibleError, match=r"step 2 .*every control is rejected"):
+        solve(chain(battery_power_w=np.zeros((4, 2)), feasible=feasible))
+    power = np.tile([0.0, 100.0], (4, 1))
+    feasible[2] = [False, True]
+    with pytest.raises(InfeasibleError, match=r"step 2 .*switch"):
+        solve(chain(battery_power_w=power, feasible=feasible, switch_allowed=np.eye(2, dtype=bool)))
+
+
+def test_a_problem_from_arrays_alone_is_solved_to_a_certificate():
+    rng = np.random.default_rng(5)
+    power = np.linspace(-8e3, 8e3, 33) + np.zeros((200, 1))
+    demand = 10e3 + 8e3 * np.sin(np.arange(200) / 9)[:, None]
+    engine = demand - power
+    fuel = 1e-4 + engine / 43e6 / 0.38 * (1 + engine / 1e5) + rng.uniform(0, 1e-6, power.shape)
+    fuel[engine < 0] = np.nan
+    battery = Battery(
+        np.array([0.0, 0.5, 1.0]), np.array([190.0, 200.0, 230.0]), np.array([0.4, 0.3, 0.3]),
+        np.array([0.3, 0.3, 0.5]), 2 * 3600, 0.95, 0.4, 0.8, current_max_discharge_a=30.0,
+    )  # fmt: skip
+    problem = Problem(ControlTable.from_arrays(fuel, power, engine >= 0), battery, 0.6, 0.6)
+    assert not problem.table.feasible[:, power[0] > 30 * 200].any()
+    trajectory = simulate(problem, dp.solve(problem).control)
+    bound, _ = certify(problem, trajectory).bound_kg(trajectory.end_j)
+    assert 0 <= trajectory.cost_kg / bound - 1 < 1e-3
