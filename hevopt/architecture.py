@@ -4,19 +4,20 @@ An architecture names its components; a name is looked for in `components/` besi
 shipped ones, and a path is relative to the file.
 """
 
-from dataclasses import dataclass
-from math import inf
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf, pi
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from hevopt.battery import Battery
-from hevopt.datafile import FileModel, Model, read_toml
+from hevopt.datafile import SHAPES, FileModel, Model, read_toml, shape_of
 from hevopt.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
 from hevopt.errors import DataError
-from hevopt.files import find, shipped_folder
+from hevopt.files import find, is_path, shipped_folder, shown
 from hevopt.machine import Machine
 from hevopt.transmission import Gearbox
 from hevopt.units import TO_SI
@@ -26,11 +27,36 @@ Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "
 CouplingKind = Literal[
     "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
 ]
-Fraction = Annotated[float, Field(gt=0, le=1)]
+
+
+def _on_one_line(text: str) -> str:
+    if not text.isprintable() or text.isspace():
+        raise ValueError("printable characters on one line are needed")
+    return text
+
+
+Number, List, Table = map(Tag, SHAPES)
+Shape = Discriminator(shape_of)
+Name = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_on_one_line)]
+Description = Annotated[str, Field(max_length=500), AfterValidator(_on_one_line)]
+# Wide bounds: their task is that no sum or square of what a file holds overflows.
+Fraction = Annotated[float, Field(ge=0.01, le=1)]
 Soc = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[float, Field(gt=0, le=1e9)]
+Positive = Annotated[float, Field(ge=1e-6, le=1e9)]
 NotNegative = Annotated[float, Field(ge=0, le=1e9)]
-Curve = Annotated[list[float], Field(min_length=2, max_length=10_000)]
+Coefficient = Annotated[float, Field(ge=-1e6, le=1e6)]
+NotPositive = Annotated[float, Field(ge=-1e6, le=0)]
+Ratio = Annotated[float, Field(ge=0.01, le=50)]
+Curve = Annotated[list[Coefficient], Field(min_length=2, max_length=10_000)]
+Speeds = Annotated[
+    list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=2, max_length=10_000)
+]
+Built = TypeVar("Built")
+Ohm = Annotated[Annotated[NotNegative, Number] | Annotated[list[NotNegative], List], Shape]
+_MASS_MIN_KG = 50.0
+_MAP_MAX = 1e6
+# exp() of more than this overflows.
+_EXPONENT_MAX = 700.0
 
 
 class CouplingFile(FileModel):
@@ -38,7 +64,7 @@ class CouplingFile(FileModel):
 
     kind: CouplingKind
     second_clutch: bool | None = None
-    machine_ratio: Annotated[float, Field(gt=0, le=50)] | None = None
+    machine_ratio: Ratio | None = None
     machine_efficiency: Fraction | None = None
     disconnects_above_speed_max: bool = False
     machine_shift_fuel_g: Annotated[float, Field(ge=0, le=10)] = 0.0
@@ -64,8 +90,8 @@ class CouplingFile(FileModel):
 class ArchitectureFile(FileModel):
     """An architecture: its components' names, functions (Table 1) and coupling."""
 
-    name: Annotated[str, Field(min_length=1, max_length=80)]
-    description: str = ""
+    name: Name
+    description: Description = ""
     car: str
     engine: str
     gearbox: str
@@ -73,6 +99,7 @@ class ArchitectureFile(FileModel):
     battery: str
     hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
     functions: list[Function]
+    gear: Literal["cycle", "free"] = "cycle"
     coupling: CouplingFile
 
 
@@ -80,28 +107,32 @@ class RoadLoadFile(FileModel):
     """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12)."""
 
     rolling_c0: Annotated[float, Field(ge=0, le=0.2)] | None = None
-    rolling_c1_spm: float = 0.0
-    rolling_c2_s2pm2: float = 0.0
-    rolling_c3_s3pm3: float = 0.0
+    rolling_c1_spm: Coefficient = 0.0
+    rolling_c2_s2pm2: Coefficient = 0.0
+    rolling_c3_s3pm3: Coefficient = 0.0
     drag_area_m2: Annotated[float, Field(ge=0, le=20)] | None = None
-    air_density_kgpm3: Annotated[float, Field(gt=0, le=2)] = 1.2
-    coastdown_c0_n: NotNegative | None = None
-    coastdown_c1_nspm: float = 0.0
-    coastdown_c2_ns2pm2: float = 0.0
+    air_density_kgpm3: Annotated[float, Field(ge=0.01, le=2)] = 1.2
+    coastdown_c0_n: Annotated[float, Field(ge=0, le=1e6)] | None = None
+    coastdown_c1_nspm: Coefficient = 0.0
+    coastdown_c2_ns2pm2: Coefficient = 0.0
 
     @model_validator(mode="after")
     def _one_form(self):
-        coefficients = self.coastdown_c0_n is not None
-        parts = self.rolling_c0 is not None and self.drag_area_m2 is not None
-        if coefficients == parts:
-            raise ValueError("give either rolling_c0 and drag_area_m2, or coastdown_c0_n")
+        coastdown = {key for key in self.model_fields_set if key.startswith("coastdown")}
+        parts = self.model_fields_set - coastdown
+        whole = {"rolling_c0", "drag_area_m2"} <= parts or "coastdown_c0_n" in coastdown
+        if not whole or (coastdown and parts):
+            raise ValueError(
+                "give either rolling_c0 and drag_area_m2, or coastdown_c0_n, and no key of the other "
+                f"form; found: {', '.join(sorted(self.model_fields_set)) or 'none'}"
+            )
         return self
 
 
 class CarFile(FileModel):
     """A car without powertrain."""
 
-    name: str
+    name: Name
     mass_kg: Annotated[float, Field(ge=50, le=100_000)]
     tyre_radius_m: Annotated[float, Field(ge=0.1, le=1.5)]
     wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
@@ -116,42 +147,42 @@ class FuelFile(FileModel):
 
 
 class FullLoadFile(FileModel):
-    speed_rpm: Curve
+    speed_rpm: Speeds
     torque_nm: Curve
 
     @model_validator(mode="after")
     def _curve(self):
         if len(self.speed_rpm) != len(self.torque_nm):
             raise ValueError("speed_rpm and torque_nm must have one length")
-        if min(self.speed_rpm) < 0 or (np.diff(self.speed_rpm) <= 0).any():
-            raise ValueError("speed_rpm must be >= 0 and increase")
+        if (np.diff(self.speed_rpm) <= 0).any():
+            raise ValueError("speed_rpm must increase")
         if min(self.torque_nm) <= 0:
             raise ValueError(f"every torque_nm must be > 0, found {min(self.torque_nm):g}")
         return self
 
 
 class FuelCoefficientsFile(FileModel):
-    a: Annotated[float, Field(gt=0)]
-    b: float
-    c: float
-    a2: Annotated[float, Field(le=0)]
-    l: Annotated[float, Field(lt=0)]  # noqa: E741
-    l2: Annotated[float, Field(le=0)]
+    a: Annotated[float, Field(ge=0.01, le=10)]
+    b: Coefficient
+    c: Coefficient
+    a2: NotPositive
+    l: Annotated[float, Field(ge=-1e6, le=-1e-3)]  # noqa: E741
+    l2: NotPositive
 
 
 class NoxCoefficientsFile(FileModel):
     m0: NotNegative
     lo: NotNegative
     hi: NotNegative
-    p0: float
-    p1: float
-    dp: Positive
+    p0: Coefficient
+    p1: Coefficient
+    dp: Annotated[float, Field(ge=0.01, le=1e6)]
 
 
 class EngineGridFile(FileModel):
     """A measured map: rows are speeds, columns torques; nan marks a cell that was not measured."""
 
-    speed_rpm: Curve
+    speed_rpm: Speeds
     torque_nm: Curve
     fuel_gps: list[list[Annotated[float, Field(allow_inf_nan=True)]]]
     nox_gps: list[list[Annotated[float, Field(allow_inf_nan=True)]]] | None = None
@@ -166,8 +197,11 @@ class EngineGridFile(FileModel):
                 continue
             if len(grid) != shape[0] or any(len(row) != shape[1] for row in grid):
                 raise ValueError(f"{name} must have {shape[0]} rows of {shape[1]} values")
-            if np.nanmin(grid) < 0 or np.isinf(grid).any():
-                raise ValueError(f"{name} must be finite and >= 0, or nan where not measured")
+            values = np.array(grid)
+            if np.isnan(values).all():
+                raise ValueError(f"{name} holds nan only; give the measured values")
+            if not (np.isnan(values) | ((values >= 0) & (values <= _MAP_MAX))).all():
+                raise ValueError(f"{name}: allowed: 0 to {_MAP_MAX:g}, or nan where not measured")
         if len(self.motoring_torque_nm) != shape[0] or max(self.motoring_torque_nm) >= 0:
             raise ValueError(f"motoring_torque_nm must be {shape[0]} values below 0")
         if (np.diff(self.speed_rpm) <= 0).any() or (np.diff(self.torque_nm) <= 0).any():
@@ -176,7 +210,7 @@ class EngineGridFile(FileModel):
 
 
 class EngineFile(FileModel):
-    name: str
+    name: Name
     displacement_cm3: Annotated[float, Field(ge=10, le=100_000)]
     bore_mm: Annotated[float, Field(ge=10, le=1000)]
     stroke_mm: Annotated[float, Field(ge=10, le=1000)]
@@ -202,6 +236,42 @@ class EngineFile(FileModel):
             )
         return self
 
+    @model_validator(mode="after")
+    def _fuel_at_every_speed(self):
+        """The p_mf equation (engine.py) has a root, and rising fuel, up to full load and top speed."""
+        if self.fuel_coefficients is None:
+            return self
+        k, curve = self.fuel_coefficients, self.full_load
+        rpm = np.union1d(np.linspace(0.0, curve.speed_rpm[-1], 201), curve.speed_rpm)
+        piston_mps = 2 * self.stroke_mm / 1e3 * rpm / 60
+        slope = k.a + k.b * piston_mps + k.c * piston_mps**2
+        torque = np.interp(rpm, curve.speed_rpm, curve.torque_nm)
+        full_bar = 4 * pi * torque / (self.displacement_cm3 * 1e-6) / 1e5
+        root = slope**2 + 4 * k.a2 * (full_bar - k.l - k.l2 * piston_mps**2)
+        if (slope <= 0).any():
+            raise ValueError(
+                f"fuel_coefficients: a + b cm + c cm² is {slope.min():.3g} at "
+                f"{rpm[np.argmin(slope)]:g} rpm; it must be > 0 from 0 to full_load's top speed"
+            )
+        if (root < 0).any():
+            raise ValueError(
+                f"fuel_coefficients: full load at {rpm[np.argmin(root)]:g} rpm has no fuel; lower "
+                "full_load.torque_nm or bring a2 closer to 0"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _nox_steepness(self):
+        k = self.nox_coefficients
+        if k is not None:
+            tops = [k.p0 + k.p1 * (rpm / 1000 - 2) for rpm in (0.0, self.full_load.speed_rpm[-1])]
+            if max(tops) > _EXPONENT_MAX * k.dp:
+                raise ValueError(
+                    f"nox_coefficients: (p0 + p1 (n/1000 - 2)) / dp reaches {max(tops) / k.dp:.3g} "
+                    f"by full_load's top speed; allowed: up to {_EXPONENT_MAX:g}; raise dp"
+                )
+        return self
+
 
 class ShiftSpeedsFile(FileModel):
     up_kmh: list[Positive]
@@ -209,12 +279,20 @@ class ShiftSpeedsFile(FileModel):
     engage_before_launch_s: Annotated[float, Field(ge=0, le=60)] = 1.0
 
 
+class FreeGearFile(FileModel):
+    """What limits a gear that the strategy chooses."""
+
+    shift_fuel_g: Annotated[float, Field(ge=0, le=10)]
+    engine_speed_min_rpm: Annotated[float, Field(ge=0, le=10_000)]
+
+
 class GearboxFile(FileModel):
-    name: str
-    ratios: Annotated[list[Positive], Field(min_length=1, max_length=20)]
-    final_drive_ratio: Annotated[float, Field(gt=0, le=50)]
-    efficiency: Fraction | list[Fraction]
+    name: Name
+    ratios: Annotated[list[Ratio], Field(min_length=1, max_length=20)]
+    final_drive_ratio: Ratio
+    efficiency: Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape]
     shift_speeds: ShiftSpeedsFile
+    free_gear: FreeGearFile | None = None
 
     @model_validator(mode="after")
     def _lengths(self):
@@ -233,7 +311,7 @@ class GearboxFile(FileModel):
 
 
 class MachineFile(FileModel):
-    name: str
+    name: Name
     kind: Literal["loss", "efficiency"]
     power_max_w: Positive
     torque_max_nm: Positive | None = None
@@ -279,13 +357,15 @@ class SocFile(FileModel):
 class BatteryFile(FileModel):
     """A battery of equal cells in series, figures per cell, over SOC where they are lists."""
 
-    name: str
+    name: Name
     cells_in_series: Annotated[int, Field(ge=1, le=10_000)]
     capacity_ah: Positive
-    open_circuit_v: LinearVoltageFile | list[Positive]
-    resistance_ohm: NotNegative | list[NotNegative] | None = None
-    discharge_ohm: NotNegative | list[NotNegative] | None = None
-    charge_ohm: NotNegative | list[NotNegative] | None = None
+    open_circuit_v: Annotated[
+        Annotated[LinearVoltageFile, Table] | Annotated[list[Positive], List], Shape
+    ]
+    resistance_ohm: Ohm | None = None
+    discharge_ohm: Ohm | None = None
+    charge_ohm: Ohm | None = None
     curve_soc: list[Soc] | None = None
     coulombic_efficiency: Fraction = 1.0
     power_max_w: Positive | None = None
@@ -294,8 +374,12 @@ class BatteryFile(FileModel):
 
     @model_validator(mode="after")
     def _curves(self):
-        if (self.resistance_ohm is None) == (self.discharge_ohm is None or self.charge_ohm is None):
-            raise ValueError("give either resistance_ohm, or discharge_ohm and charge_ohm")
+        given = self.model_fields_set & {"resistance_ohm", "discharge_ohm", "charge_ohm"}
+        if given not in ({"resistance_ohm"}, {"discharge_ohm", "charge_ohm"}):
+            raise ValueError(
+                "give either resistance_ohm, or discharge_ohm and charge_ohm; found: "
+                f"{', '.join(sorted(given)) or 'none'}"
+            )
         lists = [v for v in (self.open_circuit_v, *self.resistances()) if isinstance(v, list)]
         if lists and self.curve_soc is None:
             raise ValueError("values over SOC need curve_soc")
@@ -340,52 +424,87 @@ class Architecture:
     soc_start: float
     coupling: Coupling
     functions: frozenset[str]
+    gear: Literal["cycle", "free"]
     source: Path
+
+    def with_free_gear(self) -> "Architecture":
+        """The same car with the engine's gear as a control; DataError where its gearbox does not allow it."""
+        if self.gearbox.shift_fuel_kg is None:
+            raise DataError(
+                f"{self.source}: gear 'free' needs the table [free_gear] with shift_fuel_g and "
+                f"engine_speed_min_rpm in the file of gearbox {self.gearbox.name!r}"
+            )
+        return replace(self, gear="free")
 
 
 def load_architecture(name: str | Path) -> Architecture:
     """The architecture of a shipped name (`C2`) or a TOML file's path."""
     path = find("architectures", name, ".toml")
     data = read_toml(path, ArchitectureFile)
-    battery = _component(path, "battery", data.battery, BatteryFile)
-    coupling = data.coupling
-    return Architecture(
+    battery, soc_start = _component(
+        path, "battery", data.battery, BatteryFile, lambda file: (_battery(file), file.soc.start)
+    )
+    vehicle = _component(
+        path, "car", data.car, CarFile, lambda file: _vehicle(file, data.hybrid_mass_kg)
+    )
+    gearbox = _component(path, "gearbox", data.gearbox, GearboxFile, _gearbox)
+    if data.coupling.kind == "even_shaft" and len(gearbox.ratios) < 3:
+        raise DataError(
+            f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
+            "or more; choose another gearbox or kind"
+        )
+    car = Architecture(
         name=data.name,
         description=data.description,
-        vehicle=_vehicle(_component(path, "car", data.car, CarFile), data.hybrid_mass_kg),
-        engine=_engine(_component(path, "engine", data.engine, EngineFile)),
-        gearbox=_gearbox(_component(path, "gearbox", data.gearbox, GearboxFile)),
-        machine=_machine(_component(path, "machine", data.machine, MachineFile)),
-        battery=_battery(battery),
-        soc_start=battery.soc.start,
-        coupling=Coupling(
-            coupling.kind,
-            bool(coupling.second_clutch),
-            coupling.machine_ratio or 1.0,
-            coupling.machine_efficiency or 1.0,
-            coupling.disconnects_above_speed_max,
-            coupling.machine_shift_fuel_g * TO_SI["_g"][1],
-        ),
+        vehicle=vehicle,
+        engine=_component(path, "engine", data.engine, EngineFile, _engine),
+        gearbox=gearbox,
+        machine=_component(path, "machine", data.machine, MachineFile, _machine),
+        battery=battery,
+        soc_start=soc_start,
+        coupling=_coupling(data.coupling),
         functions=frozenset(data.functions),
+        gear="cycle",
         source=path,
     )
+    return car.with_free_gear() if data.gear == "free" else car
 
 
-def _component(path: Path, key: str, name: str, model: type[Model]) -> Model:
-    beside = path.parent / "components"
-    if "/" in name or "\\" in name or name.endswith(".toml"):
-        beside = path.parent
+def _component(
+    path: Path, key: str, name: str, model: type[Model], build: Callable[[Model], Built]
+) -> Built:
+    """A component of the architecture file at `path`, built from the file that its key names."""
+    beside = path.parent if is_path(name, ".toml") else path.parent / "components"
     folder = beside if beside.is_dir() else shipped_folder("architectures") / "components"
     try:
-        return read_toml(find("architectures/components", name, ".toml", beside=folder), model)
+        found = find("architectures/components", name, ".toml", beside=folder)
     except DataError as error:
-        if str(error).startswith(("architectures/components", "architectures/component ")):
-            raise DataError(f"{path}, {key}: {error}") from None
-        raise
+        raise DataError(f"{path}, {key}: {error}") from None
+    file = read_toml(found, model)
+    try:
+        return build(file)
+    except DataError as error:
+        raise DataError(f"{found}: {error}") from None
+
+
+def _coupling(data: CouplingFile) -> Coupling:
+    return Coupling(
+        data.kind,
+        bool(data.second_clutch),
+        data.machine_ratio or 1.0,
+        data.machine_efficiency or 1.0,
+        data.disconnects_above_speed_max,
+        data.machine_shift_fuel_g * TO_SI["_g"][1],
+    )
 
 
 def _vehicle(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
     load, mass_kg = car.road_load, car.mass_kg + hybrid_mass_kg
+    if mass_kg < _MASS_MIN_KG:
+        raise DataError(
+            f"mass_kg {car.mass_kg:g} and the architecture's hybrid_mass_kg {hybrid_mass_kg:g} add up "
+            f"to {mass_kg:g} kg; allowed: {_MASS_MIN_KG:g} kg or more; raise one of them"
+        )
     if load.coastdown_c0_n is not None:
         rolling = (0.0, 0.0, 0.0, 0.0)
         air = (load.coastdown_c0_n, load.coastdown_c1_nspm, load.coastdown_c2_ns2pm2, 0.0)
@@ -443,7 +562,7 @@ def _engine(data: EngineFile) -> Engine:
 
 
 def _gearbox(data: GearboxFile) -> Gearbox:
-    gears, kmh = len(data.ratios), TO_SI["_kmh"][1]
+    gears, kmh, free = len(data.ratios), TO_SI["_kmh"][1], data.free_gear
     efficiency = data.efficiency if isinstance(data.efficiency, list) else [data.efficiency] * gears
     return Gearbox(
         data.name,
@@ -452,6 +571,8 @@ def _gearbox(data: GearboxFile) -> Gearbox:
         np.array(data.shift_speeds.up_kmh) * kmh,
         np.array(data.shift_speeds.down_kmh) * kmh,
         data.shift_speeds.engage_before_launch_s,
+        None if free is None else free.shift_fuel_g * TO_SI["_g"][1],
+        0.0 if free is None else free.engine_speed_min_rpm * TO_SI["_rpm"][1],
     )
 
 

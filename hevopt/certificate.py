@@ -1,14 +1,15 @@
 """Certificates: how little any plan could cost on the same problem, with the kind of proof.
 
-A ladder of proofs, each dearer than the one before; it is climbed only while the rollout's gap is above a target.
+A ladder of proofs, each dearer than the one before. The first two take milliseconds; the others are tried only
+while the rollout's gap is above a target.
 
     one multiplier   one price on stored energy (prices.py)
     costate prices   a price per step, from the costate equation along the rollout (step_prices.py)
     LP prices        a price per step, from a linear program, where the rollout touches the window (step_prices.py)
     lower-bound DP   a cost-to-go that is nowhere above the true one, for costs of switching (lower_dp.py)
 
-A bound holds for the tabulated controls, for every strategy alike. The first three hold for every end charge, moving
-with it by their price at the end; the last one for the asked end charge or more.
+A bound holds for the tabulated controls, for every strategy alike. The first three hold for every end charge,
+moving with it by their price at the end; the last one for the asked end charge or more.
 """
 
 from collections.abc import Callable
@@ -63,11 +64,12 @@ class Certificate:
 def certify(
     problem: Problem, rollout: Trajectory | None = None, *, target_gap: float = TARGET_GAP
 ) -> Certificate:
-    """The certificate of a problem; with a rollout, up to the rung that brings its gap below `target_gap`."""
+    """The certificate of a problem; with a rollout, its costate prices, and dearer rungs up to `target_gap`."""
     certificate = Certificate(problem.end_min_j, {"one multiplier": one_price_dual(problem)})
     if rollout is None:
         return certificate
     worth = certificate.price_kgpj
+    certificate.proofs["costate prices"] = costate_dual(problem, rollout)
     for kind, climb in _rungs(problem, rollout, certificate, worth):
         if _gap(certificate, rollout) <= target_gap:
             break
@@ -78,7 +80,7 @@ def certify(
 def _rungs(
     problem: Problem, rollout: Trajectory, certificate: Certificate, worth_kgpj: float
 ) -> list[tuple[str, Callable[[str], None]]]:
-    """Kinds of proof beyond the first, in order of effort, and what adds each to the certificate."""
+    """Kinds of proof beyond the first two, in order of effort, and what adds each to the certificate."""
 
     def lines(shape: Callable[[Problem, Trajectory], list[Line]], kind: str) -> None:
         certificate.proofs[kind] = shape(problem, rollout)
@@ -87,10 +89,10 @@ def _rungs(
         bound = lower_bound_kg(problem, worth_kgpj, nodes=nodes)
         certificate.at_least[kind] = max(bound, certificate.at_least.get(kind, bound))
 
-    rungs = [("costate prices", partial(lines, costate_dual))]
+    rungs = [("lower-bound DP", partial(lower, nodes)) for nodes in LOWER_DP_NODES]
     if _touches_window(problem, rollout):
-        rungs.append(("LP prices", partial(lines, lp_dual)))
-    return rungs + [("lower-bound DP", partial(lower, nodes)) for nodes in LOWER_DP_NODES]
+        return [("LP prices", partial(lines, lp_dual)), *rungs]
+    return rungs
 
 
 def _touches_window(problem: Problem, rollout: Trajectory) -> bool:

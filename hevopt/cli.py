@@ -3,6 +3,7 @@
 0 ok, 2 bad input, 3 infeasible or solver failure.
 """
 
+import os
 import sys
 from pathlib import Path
 from time import monotonic
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hevopt import __version__
-from hevopt.errors import HevoptError
+from hevopt.errors import DataError, HevoptError, SolverError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -27,6 +28,9 @@ app = typer.Typer(
 
 _PROGRESS_AFTER_S = 2.0
 _WIDEST = 400
+_INTERRUPTED = 130
+# A wrong option or argument. Click's class, which typer imports from click or carries along.
+_UsageError = typer.BadParameter.__bases__[0]
 
 CycleOption = Annotated[str, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
 NoxOption = Annotated[
@@ -48,7 +52,7 @@ def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     if version:
-        print(f"hevopt {__version__}")
+        _write(f"hevopt {__version__}")
         raise typer.Exit
 
 
@@ -56,11 +60,12 @@ def _root(
 def compare(
     cycle: CycleOption = "nedc",
     architectures: Annotated[
-        str, typer.Option("--architectures", help="Names or files, separated by commas.")
-    ] = "",
+        str | None, typer.Option("--architectures", help="Names or files, separated by commas.")
+    ] = None,
     strategies: Annotated[
-        str, typer.Option("--strategies", help="Names, separated by commas; default: all that fit.")
-    ] = "",
+        str | None,
+        typer.Option("--strategies", help="Names, separated by commas; default: all that fit."),
+    ] = None,
     nox_weight: NoxOption = 0.0,
     allow_shortfall: ShortfallOption = False,
     json: JsonOption = False,
@@ -78,10 +83,10 @@ def compare(
             progress=progress,
         )
     if json:
-        print(report.comparison_json(comparison))
+        _write(report.comparison_json(comparison))
     else:
         _show(report.comparison_table(comparison))
-        print(report.comparison_notes(comparison) + "\n")
+        _write(report.comparison_notes(comparison) + "\n")
         published = report.published_table(comparison)
         if published is not None:
             _show(published)
@@ -113,6 +118,8 @@ def run(
 
     strategy_named(strategy)
     car, trace = load_architecture(architecture), load_cycle(cycle)
+    if out is not None:
+        _check_out(out, architecture, cycle)
     with _Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
         problem = build_problem(car, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
@@ -123,15 +130,15 @@ def run(
     if out is not None:
         report.write_trajectory(out, problem, trajectory)
     if json:
-        print(report.comparison_json(comparison))
+        _write(report.comparison_json(comparison))
         return
     _show(report.comparison_table(comparison))
-    print(report.comparison_notes(comparison))
+    _write(report.comparison_notes(comparison))
     calibration = report.calibration_table(plan)
     if calibration is not None:
         _show(calibration)
     if out is not None:
-        print(f"trajectory written to {out}")
+        _write(f"trajectory written to {out}")
 
 
 @app.command()
@@ -148,15 +155,12 @@ def table(
     from hevopt.cycle import load_cycle
     from hevopt.powertrain import build_problem
 
-    problem = build_problem(
-        load_architecture(architecture),
-        load_cycle(cycle),
-        nox_weight=nox_weight,
-        allow_shortfall=allow_shortfall,
-    )
+    car, trace = load_architecture(architecture), load_cycle(cycle)
+    _check_out(out, architecture, cycle)
+    problem = build_problem(car, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
     report.write_table(out, problem)
     steps, controls = problem.table.fuel_kg.shape
-    print(
+    _write(
         f"{steps} steps x {controls} controls written to {out}; its README entry names the arrays"
     )
 
@@ -170,7 +174,7 @@ def architectures() -> None:
 
     for name in shipped_names("architectures", ".toml"):
         car = load_architecture(name)
-        print(f"{name:4} {car.description:45} {', '.join(fitting(car.functions))}")
+        _write(f"{name:4} {car.description:45} {', '.join(fitting(car.functions))}")
 
 
 @app.command()
@@ -182,7 +186,7 @@ def cycles() -> None:
     for name in shipped_names("cycles", ".csv"):
         trace = load_cycle(name)
         gears = "gears listed" if trace.gear is not None else "gears from shift speeds"
-        print(
+        _write(
             f"{name:18} {trace.duration_s:6.0f} s {trace.distance_m / 1e3:7.2f} km "
             f"{trace.speed_mps.max() * 3.6:6.1f} km/h  {gears}"
         )
@@ -190,28 +194,81 @@ def cycles() -> None:
 
 def main() -> None:
     """Entry point: a user's mistake is one message on stderr and a status, never a traceback."""
+    # A terminal that lacks a letter of the report, such as Δ, shows "?" in its place.
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="replace")
+    status, message = 0, ""
     try:
-        app()
+        # An int where typer was left by typer.Exit, else what the command returned: None.
+        status = app(standalone_mode=False) or 0
+    except _UsageError as error:
+        error.show()
+        status = error.exit_code
     except HevoptError as error:
-        print(f"hevopt: error: {error}", file=sys.stderr)
-        raise SystemExit(error.exit_status) from None
-    except KeyboardInterrupt:
-        print("hevopt: interrupted; nothing was written", file=sys.stderr)
-        raise SystemExit(130) from None
+        status, message = error.exit_status, f"error: {error}"
+    except OSError as error:
+        status, message = DataError.exit_status, f"error: {error}"
+    except MemoryError:
+        status, message = (
+            SolverError.exit_status,
+            "error: not enough memory; choose a shorter cycle",
+        )
+    except (KeyboardInterrupt, typer.Abort):
+        status = _INTERRUPTED
+    except SystemError as error:
+        # Compiled loops turn an interrupt into this.
+        if not _comes_from_interrupt(error):
+            raise
+        status = _INTERRUPTED
+    if status == _INTERRUPTED:
+        message = "interrupted; nothing was written"
+    if message:
+        print(f"hevopt: {message}", file=sys.stderr)
+    raise SystemExit(status)
 
 
-def _listed(text: str) -> list[str] | None:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    return names or None
+def _comes_from_interrupt(error: BaseException | None) -> bool:
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _listed(text: str | None) -> list[str] | None:
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _check_out(out: Path, architecture: str, cycle: str) -> None:
+    """DataError, before anything is solved, where `out` cannot be written or is one of the inputs."""
+    from hevopt.files import find
+    from hevopt.report import check_writable
+
+    target = check_writable(out)
+    for kind, name, suffix in (("architectures", architecture, ".toml"), ("cycles", cycle, ".csv")):
+        if target.exists() and target.samefile(find(kind, name, suffix)):
+            raise DataError(f"--out {out} is the file that {name} is read from; choose another")
 
 
 def _show(table: "Table") -> None:
     """Print a table; a terminal narrower than its numbers wraps lines rather than losing digits."""
     from rich.console import Console
 
-    console = Console(highlight=False)
     needed = Console(width=_WIDEST).measure(table).maximum
-    Console(highlight=False, width=max(console.width, needed)).print(table)
+    console = Console(highlight=False, width=max(Console().width, needed))
+    with console.capture() as capture:
+        console.print(table)
+    _write(capture.get().removesuffix("\n"))
+
+
+def _write(text: str) -> None:
+    """The only way to standard output."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        # What is left in the buffer would fail once more when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            raise typer.Exit from None  # the reader, such as `head`, has seen enough
+        raise DataError(f"cannot write to standard output ({error.strerror})") from None
 
 
 class _Progress:
@@ -224,18 +281,18 @@ class _Progress:
 
     def __call__(self, text: str, done: int, total: int) -> None:
         now = monotonic()
-        line = f"{done} of {total} done, next {text}"
-        if self._status is not None:
-            self._status.update(line)
-        elif now - self._began > _PROGRESS_AFTER_S:
-            self._start(line, now)
+        if now - self._began > _PROGRESS_AFTER_S:
+            self._say(f"{done} of {total} done, next {text}", now)
 
-    def _start(self, line: str, now: float) -> None:
+    def _say(self, line: str, now: float) -> None:
         from rich.console import Console
+        from rich.text import Text
 
         console = Console(stderr=True)
-        if console.is_terminal:
-            self._status = console.status(line)
+        if self._status is not None:
+            self._status.update(Text(line))
+        elif console.is_terminal:
+            self._status = console.status(Text(line))
             self._status.start()
         elif now - self._said_s > _PROGRESS_AFTER_S:
             self._said_s = now

@@ -15,7 +15,7 @@ Machine path:
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ Flags = NDArray[np.bool_]
 class Joint:
     """One discrete way to drive; all arrays (time,).
 
+    machine_gear: 0 where the machine has no choice; engine_gear: 0 where the cycle gives the gear
     locked, slipping: engine clutch; both False: the engine's torque does not reach the gearbox
     upstream, shared: machine path; both False: own path with `machine_ratio`, `machine_efficiency`
     possible: False where this joint cannot exist (the machine's gear is not the engine's, ...)
@@ -40,6 +41,7 @@ class Joint:
 
     engine_on: bool
     machine_gear: int
+    engine_gear: int
     gear_ratio: Array
     gear_efficiency: Array
     engine_speed_radps: Array
@@ -74,10 +76,33 @@ class _Clutch:
 
 
 def joints(architecture: Architecture, demand: Demand) -> Iterator[Joint]:
-    """Every joint of the architecture: engine turning first, then at rest."""
+    """Every joint of the architecture: engine turning first, then at rest; with a free gear, gear by gear."""
+    if architecture.gear == "cycle":
+        yield from _joints_in_gear(architecture, demand)
+        return
+    through_gearbox = architecture.coupling.kind == "gearbox_input"
+    for gear in range(1, len(architecture.gearbox.ratios)):
+        in_gear = demand.with_gear(np.full_like(demand.gear, gear))
+        for joint in _joints_in_gear(architecture, in_gear):
+            if joint.engine_on or through_gearbox:
+                possible = joint.possible & _may_drive(architecture, joint, gear)
+                yield replace(joint, engine_gear=gear, possible=possible)
+            elif gear == 1:
+                yield joint
+
+
+def _joints_in_gear(architecture: Architecture, demand: Demand) -> Iterator[Joint]:
     coupling = COUPLINGS[architecture.coupling.kind]
     for engine_on in (True, False):
         yield from coupling(architecture, demand, _clutch(architecture, demand, engine_on))
+
+
+def _may_drive(architecture: Architecture, joint: Joint, gear: int) -> Flags:
+    """Above first gear the clutch does not slip, and the engine keeps its lowest speed."""
+    if gear == 1:
+        return np.ones_like(joint.possible)
+    slow = joint.engine_speed_radps < architecture.gearbox.engine_speed_min_radps
+    return ~joint.slipping & ~(joint.locked & slow)
 
 
 def _clutch(architecture: Architecture, demand: Demand, engine_on: bool) -> _Clutch:
@@ -115,7 +140,7 @@ def _joint(
 ) -> Joint:
     shape = clutch.ratio.shape
     return Joint(
-        clutch.on, machine_gear, clutch.ratio, clutch.efficiency,
+        clutch.on, machine_gear, 0, clutch.ratio, clutch.efficiency,
         clutch.engine_speed, clutch.engine_accel, clutch.locked, clutch.slipping,
         np.where(clutch.slipping, clutch.engine_speed - clutch.input_speed, 0.0),
         np.broadcast_to(upstream, shape), np.broadcast_to(shared, shape),

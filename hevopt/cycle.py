@@ -6,23 +6,32 @@ Lines that begin with # are comments.
 """
 
 import csv
+import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
-from hevopt.files import find, read_text
+from hevopt.files import find, printable, read_text, shown
 from hevopt.units import TO_SI
 
 _SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
 _COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
+_MEGABYTES_MAX = 50
+_SAMPLES_MAX = 200_000
+_TIME_MAX_S = 1e9
 _SPEED_MAX_MPS = 100.0
 _GRADE_MAX = 0.5
-_STEP_MAX_S = 3600.0
+_STEP_MIN_S, _STEP_MAX_S = 1e-4, 3600.0
 # Twice the friction limit of a dry road: nothing on tyres does more.
 _ACCELERATION_MAX_MPS2 = 20.0
+# Figures per distance say nothing below this.
+DISTANCE_MIN_M = 1.0
+# Plainer than Python's own: no underscores, no digits of other scripts.
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +71,7 @@ class Cycle:
 def load_cycle(name: str | Path) -> Cycle:
     """The cycle of a shipped name (`nedc`) or a CSV file's path; DataError names line and value."""
     path = find("cycles", name, ".csv")
-    header, rows = _rows(path, read_text(path))
+    header, rows = _rows(path, read_text(path, _MEGABYTES_MAX))
     columns = {name: np.array([row[i] for _, row in rows]) for i, name in enumerate(header)}
     lines = [line for line, _ in rows]
     speed_column = next(c for c in _SPEED_COLUMNS if c in columns)
@@ -76,14 +85,20 @@ def load_cycle(name: str | Path) -> Cycle:
         gear = _whole_numbers(path, lines, "gear", columns["gear"], 20)
         clutch = columns.get("clutch_open", np.zeros(len(rows)))
         clutch_open = _whole_numbers(path, lines, "clutch_open", clutch, 1).astype(bool)
-    return Cycle(path.stem, columns["time_s"], speed_mps, grade, gear, clutch_open)
+    cycle = Cycle(printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open)
+    if cycle.distance_m < DISTANCE_MIN_M:
+        raise DataError(
+            f"{path}: distance {cycle.distance_m:.3g} m; a cycle must cover {DISTANCE_MIN_M:g} m or "
+            "more; check the column's unit"
+        )
+    return cycle
 
 
 def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]]]]:
     """Header names and the numbers of every data line, with its line number."""
     header: list[str] | None = None
     rows: list[tuple[int, list[float]]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         try:
@@ -97,6 +112,11 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]
             raise DataError(
                 f"{path}, line {number}: {len(cells)} values, the header has {len(header)}"
             )
+        if len(rows) == _SAMPLES_MAX:
+            raise DataError(
+                f"{path}, line {number}: more than the {_SAMPLES_MAX} data lines allowed; shorten "
+                "the cycle or use longer time steps"
+            )
         rows.append((number, [_number(path, number, *pair) for pair in zip(header, cells)]))  # noqa: B905
     if header is None:
         raise DataError(f"{path}: empty; expected a header line such as time_s,speed_kmh")
@@ -108,11 +128,15 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]
 def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
     unknown = [cell for cell in cells if cell not in _COLUMNS]
     if unknown:
+        close = get_close_matches(unknown[0].lower(), _COLUMNS, n=2, cutoff=0.7)
+        hint = f"close matches: {', '.join(close)}; " if close else ""
         raise DataError(
-            f"{path}, line {number}: unknown column {unknown[0]!r}; allowed: {', '.join(_COLUMNS)}"
+            f"{path}, line {number}: unknown column {shown(unknown[0])}; {hint}"
+            f"allowed: {', '.join(_COLUMNS)}"
         )
     if len(set(cells)) != len(cells):
-        raise DataError(f"{path}, line {number}: a column name stands twice: {','.join(cells)}")
+        twice = next(cell for cell in cells if cells.count(cell) > 1)
+        raise DataError(f"{path}, line {number}: column {twice} stands twice; remove one")
     speeds = [cell for cell in cells if cell in _SPEED_COLUMNS]
     if "time_s" not in cells or len(speeds) != 1:
         raise DataError(
@@ -125,16 +149,21 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
 
 
 def _number(path: Path, line: int, column: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        raise DataError(f"{path}, line {line}: {column} is {cell!r}, not a number") from None
+    if not _NUMBER.fullmatch(cell):
+        raise DataError(
+            f"{path}, line {line}: {column} is {shown(cell)}, not a number; a finite number such "
+            "as 12.5 is needed"
+        )
+    value = float(cell)
     if not np.isfinite(value):
-        raise DataError(f"{path}, line {line}: {column} is {cell}; a finite number is needed")
+        raise DataError(
+            f"{path}, line {line}: {column} is {shown(cell)}; a finite number is needed"
+        )
     return value
 
 
 def _check_time_and_speed(path, lines, time_s, speed_mps, column, factor) -> None:
+    _check_range(path, lines, "time_s", time_s, -_TIME_MAX_S, _TIME_MAX_S)
     steps_s = np.diff(time_s)
     if (steps_s <= 0).any():
         k = int(np.argmax(steps_s <= 0)) + 1
@@ -142,11 +171,12 @@ def _check_time_and_speed(path, lines, time_s, speed_mps, column, factor) -> Non
             f"{path}, line {lines[k]}: time {time_s[k]:g} s after {time_s[k - 1]:g} s; "
             "time must increase from line to line; sort the lines or remove the duplicate"
         )
-    if (steps_s > _STEP_MAX_S).any():
-        k = int(np.argmax(steps_s > _STEP_MAX_S)) + 1
+    outside = (steps_s < _STEP_MIN_S) | (steps_s > _STEP_MAX_S)
+    if outside.any():
+        k = int(np.argmax(outside)) + 1
         raise DataError(
-            f"{path}, line {lines[k]}: {steps_s[k - 1]:g} s after the line before; allowed: up to "
-            f"{_STEP_MAX_S:g} s; time is in seconds"
+            f"{path}, line {lines[k]}: {steps_s[k - 1]:g} s after the line before; allowed: "
+            f"{_STEP_MIN_S:g} to {_STEP_MAX_S:g} s; time is in seconds"
         )
     if (speed_mps < 0).any() or (speed_mps > _SPEED_MAX_MPS).any():
         k = int(np.argmax((speed_mps < 0) | (speed_mps > _SPEED_MAX_MPS)))
@@ -154,13 +184,11 @@ def _check_time_and_speed(path, lines, time_s, speed_mps, column, factor) -> Non
             f"{path}, line {lines[k]}: {column} is {speed_mps[k] / factor:g}; allowed: 0 to "
             f"{_SPEED_MAX_MPS / factor:g}; check the unit in the column's name"
         )
-    if not (speed_mps > 0).any():
-        raise DataError(f"{path}: the speed is 0 throughout; a cycle must cover some distance")
     acceleration = np.diff(speed_mps) / steps_s
     if (np.abs(acceleration) > _ACCELERATION_MAX_MPS2).any():
         k = int(np.argmax(np.abs(acceleration) > _ACCELERATION_MAX_MPS2)) + 1
         raise DataError(
-            f"{path}, line {lines[k]}: acceleration {acceleration[k - 1]:.1f} m/s²; allowed: "
+            f"{path}, line {lines[k]}: acceleration {acceleration[k - 1]:.3g} m/s²; allowed: "
             f"±{_ACCELERATION_MAX_MPS2:g} m/s², more than tyres hold; check the units of time and "
             "speed, or repair the spike"
         )

@@ -4,12 +4,13 @@ A path is anything with a separator or a suffix; it is taken as it stands. A nam
 shipped files, which lie inside the installed package, or beside it in a checkout.
 """
 
+from difflib import get_close_matches
 from pathlib import Path
 
 from hevopt.errors import DataError, unknown_name
 
 _PACKAGE = Path(__file__).resolve().parent
-_SIZE_LIMIT_BYTES = 100_000_000
+_SHOWN_CHARACTERS = 40
 
 
 def shipped_folder(kind: str) -> Path:
@@ -23,35 +24,53 @@ def shipped_names(kind: str, suffix: str) -> list[str]:
     return sorted(p.stem for p in shipped_folder(kind).glob(f"*{suffix}"))
 
 
+def is_path(text: str, suffix: str) -> bool:
+    """Whether a text means a file where it stands, rather than the name of one."""
+    return "/" in text or "\\" in text or text.endswith(suffix)
+
+
 def find(kind: str, name: str | Path, suffix: str, beside: Path | None = None) -> Path:
     """The file for a name or a path; `beside` is a folder searched before the shipped ones."""
-    text = str(name)
+    text, word = str(name), Path(kind).name.removesuffix("s")
     if not text.strip() or "\0" in text:
-        raise DataError(f"{kind} name {text!r} is empty or not a name; give a name or a path")
-    path = Path(text)
-    if len(path.parts) > 1 or path.suffix == suffix:
-        candidates = [path if path.is_absolute() or beside is None else beside / path]
-        if beside is not None:
-            candidates.append(path)
-        for candidate in candidates:
-            if candidate.is_file():
-                return candidate
-        what = "is a folder" if path.is_dir() else "does not exist"
-        raise DataError(f"{kind} file {text} {what}; give the path of a {suffix} file or a name")
-    for folder in filter(None, (beside, shipped_folder(kind))):
-        candidate = folder / f"{text}{suffix}"
+        raise DataError(f"{word} name {text!r} is empty or not a name; give a name or a path")
+    try:
+        if is_path(text, suffix):
+            return _file_at(text, kind, word, suffix, beside)
+        for folder in filter(None, (beside, shipped_folder(kind))):
+            if (folder / f"{text}{suffix}").is_file():
+                return folder / f"{text}{suffix}"
+    except OSError as error:
+        raise DataError(
+            f"{word} {shown(text)} cannot be looked up ({error.strerror}); check the name or path"
+        ) from None
+    raise unknown_name(word, text, shipped_names(kind, suffix))
+
+
+def _file_at(text: str, kind: str, word: str, suffix: str, beside: Path | None) -> Path:
+    path, text = Path(text), printable(text)
+    for candidate in (beside / path, path) if beside else (path,):
         if candidate.is_file():
             return candidate
-    raise unknown_name(kind.removesuffix("s"), text, shipped_names(kind, suffix))
+    if path.is_dir():
+        raise DataError(f"{word} file {text} is a folder; give the path of a {suffix} file")
+    if path.exists():
+        raise DataError(f"{word} file {text} is not a regular file; give a {suffix} file or a name")
+    close = get_close_matches(path.stem, shipped_names(kind, suffix), n=3)
+    hint = f"shipped with a close name: {', '.join(close)}; " if close else ""
+    raise DataError(
+        f"{word} file {text} does not exist; {hint}give the path of a {suffix} file or a name"
+    )
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, megabytes_max: int) -> str:
     """Contents of a text file; DataError where it cannot be read as UTF-8 text."""
     try:
-        if path.stat().st_size > _SIZE_LIMIT_BYTES:
+        megabytes = path.stat().st_size / 1e6
+        if megabytes > megabytes_max:
             raise DataError(
-                f"{path}: {path.stat().st_size / 1e6:.0f} MB, more than the "
-                f"{_SIZE_LIMIT_BYTES / 1e6:.0f} MB allowed for a data file"
+                f"{path}: {megabytes:.1f} MB; allowed: up to {megabytes_max} MB for a "
+                f"{path.suffix} file; give a smaller file"
             )
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -60,3 +79,17 @@ def read_text(path: Path) -> str:
         ) from None
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+
+
+def shown(value: object) -> str:
+    """A value of a file as a message quotes it: on one line, printable, and short."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # thousands of digits, or of brackets
+        return f"a very long {type(value).__name__}"
+    return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 3] + "..."
+
+
+def printable(text: str) -> str:
+    """The text with what a terminal could take for a command, such as a line end, as '?'."""
+    return "".join(c if c.isprintable() else "?" for c in text)

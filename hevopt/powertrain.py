@@ -66,7 +66,7 @@ def build_problem(
     `allow_shortfall` such steps are driven with what the powertrain can give, and marked in the table.
     """
     demand = demand_of(cycle, architecture.vehicle, architecture.gearbox)
-    if cycle.gear is None:
+    if cycle.gear is None and architecture.gear == "cycle":
         demand = change_down(
             demand, architecture.vehicle, architecture.engine, architecture.gearbox
         )
@@ -97,6 +97,7 @@ def build_table(
             branches = _branches(architecture, demand, levels)
             stuck = _stuck(branches)
         if stuck.any():
+            missing = np.zeros_like(missing) if allow_shortfall else missing
             raise InfeasibleError(
                 _shortfall_message(architecture, demand, stuck, missing, branches)
             )
@@ -272,7 +273,7 @@ def _assemble(
         for name in branches[0].flows
     }
     controls = tuple(
-        Control(branch.joint.engine_on, branch.joint.machine_gear, label)
+        Control(branch.joint.engine_on, branch.joint.machine_gear, label, branch.joint.engine_gear)
         for branch in branches
         for label in branch.labels
     )
@@ -302,16 +303,29 @@ def _joined(parts: list[Array], widths: list[int], steps: int) -> Array:
 def _modes(architecture: Architecture, branches: list[_Branch]) -> tuple[NDArray[np.int64], Array]:
     """Mode of every branch, and the fuel of going from one mode to another, (mode, mode).
 
-    Machine gears are modes of their own only where changing them costs something.
+    Gears are modes of their own only where changing them costs something.
     """
-    shift_kg = architecture.coupling.machine_shift_fuel_kg
-    keys = [(b.joint.engine_on, b.joint.machine_gear if shift_kg else 0) for b in branches]
+    machine_kg = architecture.coupling.machine_shift_fuel_kg
+    engine_kg = architecture.gearbox.shift_fuel_kg or 0.0
+    keys = [
+        (
+            branch.joint.engine_on,
+            branch.joint.machine_gear if machine_kg else 0,
+            branch.joint.engine_gear if engine_kg else 0,
+        )
+        for branch in branches
+    ]
     distinct = list(dict.fromkeys(keys))
     switch = np.zeros((len(distinct), len(distinct)))
-    for i, (was_on, from_gear) in enumerate(distinct):
-        for j, (is_on, to_gear) in enumerate(distinct):
+    for i, (was_on, machine_from, engine_from) in enumerate(distinct):
+        for j, (is_on, machine_to, engine_to) in enumerate(distinct):
             start = architecture.engine.start_fuel_kg if is_on and not was_on else 0.0
-            switch[i, j] = start + (shift_kg if from_gear != to_gear else 0.0)
+            changed = engine_from != engine_to and engine_from > 0 and engine_to > 0
+            switch[i, j] = (
+                start
+                + (machine_kg if machine_from != machine_to else 0.0)
+                + (engine_kg if changed else 0.0)
+            )
     return np.array([distinct.index(key) for key in keys]), switch
 
 
@@ -328,17 +342,42 @@ def _shortfall_message(
     for k in steps[:_SHORTFALLS_LISTED]:
         counts = {word: int(np.sum(reject[k] & bit > 0)) for bit, word in REJECT_WORDS.items()}
         reasons = ", ".join(f"{word} {count}" for word, count in counts.items() if count)
+        torque = f", {missing[k]:.0f} Nm missing at the wheels" if missing[k] > 0 else ""
         lines.append(
             f"t = {demand.time_s[k]:g} s: {demand.speed_mps[k] * 3.6:.1f} km/h, gear "
-            f"{demand.gear[k]}, {demand.wheel_power_w[k] / 1e3:.1f} kW at the wheels, "
-            f"{missing[k]:.0f} Nm missing at the wheels "
-            f"(of {reject.shape[1]} controls rejected: {reasons})"
+            f"{demand.gear[k]}, {demand.wheel_power_w[k] / 1e3:.1f} kW at the wheels"
+            f"{torque} (of {reject.shape[1]} controls rejected: {reasons})"
         )
     more = len(steps) - len(lines)
     lines += [f"and {more} more"] if more else []
     return (
         f"architecture {architecture.name} cannot follow the cycle at {len(steps)} of "
-        f"{len(stuck)} steps:\n  " + "\n  ".join(lines) + "\n  choose an easier cycle, a stronger "
-        "engine (full_load in its file) or lower gears, or pass --allow-shortfall to drive on with "
-        "what there is"
+        f"{len(stuck)} steps:\n  "
+        + "\n  ".join(lines + _shortfall_advice(demand, stuck, missing, reject))
     )
+
+
+def _shortfall_advice(
+    demand: Demand, stuck: NDArray[np.bool_], missing: Array, reject: Bits
+) -> list[str]:
+    """What to do, by what is wrong: the cycle's gear, too little torque, or a limit."""
+    neutral = stuck & (demand.gear == 0) & (demand.wheel_torque_nm > 0)
+    weak, limited = stuck & ~neutral & (missing > 0), stuck & ~neutral & (missing == 0)
+    advice = []
+    if neutral.any():
+        advice.append(
+            "correct the cycle's gear column: in gear 0 the engine cannot drive the wheels"
+        )
+    if weak.any():
+        advice.append(
+            "choose an easier cycle, a stronger engine (full_load in its file) or lower gears, or pass "
+            "--allow-shortfall to drive on with what there is"
+        )
+    if limited.any():
+        counts = {w: int(np.sum(reject[limited] & bit > 0)) for bit, w in REJECT_WORDS.items()}
+        del counts[REJECT_WORDS[Reject.DUPLICATE]]
+        advice.append(
+            f"where no torque is missing, most controls are rejected for: {max(counts, key=counts.get)}; "
+            "widen that limit in its component's file, or choose an easier cycle"
+        )
+    return advice

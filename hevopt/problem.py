@@ -48,11 +48,13 @@ REJECT_WORDS: dict[Reject, str] = {
 
 
 class Control(NamedTuple):
-    """Label of a control: engine turning or not, the machine's gear (0 where it has none), torque level."""
+    """Label of a control: engine turning or not, the machine's gear (0 where it has none), torque level, and
+    the engine's gear where it is a choice (0 where the cycle gives it)."""
 
     engine_on: bool
     machine_gear: int
     level: str
+    engine_gear: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,9 +6,10 @@ Analysis - Theory and Application (2011), section 4.2: NEDC, warm, change agains
 
 from typing import NamedTuple
 
-from hevopt.study import Row
+from hevopt.study import Comparison
 
-CYCLE = "nedc"
+# What the published changes are measured on and against.
+CYCLE, REFERENCE = "nedc", "A baseline"
 
 
 class Published(NamedTuple):
@@ -20,9 +21,11 @@ class Published(NamedTuple):
     differs: str
 
 
-def published_beside(rows: list[Row]) -> list[Published]:
-    """The published statements with ours from the rows, where the rows hold what they need."""
-    by_case = {(row.architecture, row.strategy): row for row in rows}
+def published_beside(comparison: Comparison) -> list[Published]:
+    """The published statements with ours, where cycle and reference are theirs and the rows are there."""
+    if (comparison.cycle, comparison.reference) != (CYCLE, REFERENCE):
+        return []
+    by_case = {(row.architecture, row.strategy): row for row in comparison.rows}
 
     def fuel(case: tuple[str, str]) -> float | None:
         row = by_case.get(case)

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import stat
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,10 +13,11 @@ from typing import Any
 import numpy as np
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
 from hevopt.errors import DataError
 from hevopt.problem import Plan, Problem, Trajectory
-from hevopt.published import CYCLE, published_beside
+from hevopt.published import published_beside
 from hevopt.study import Comparison, Row
 
 TABLE_README = """hevopt control table. Arrays are (time, control) unless said otherwise.
@@ -42,7 +44,7 @@ def comparison_table(comparison: Comparison) -> Table:
     """The rows as a table for the terminal."""
     table = Table(
         box=box.SIMPLE_HEAD,
-        title=f"cycle {comparison.cycle}",
+        title=Text(f"cycle {comparison.cycle}", style="table.title"),
         title_justify="left",
         collapse_padding=True,
         pad_edge=False,
@@ -62,7 +64,8 @@ def comparison_table(comparison: Comparison) -> Table:
         if previous not in (None, row.architecture):
             table.add_section()
         previous = row.architecture
-        table.add_row(*_cells(row))
+        # Text, because a name such as "[red]" would be markup in a string.
+        table.add_row(*map(Text, _cells(row)))
     return table
 
 
@@ -107,8 +110,8 @@ def comparison_notes(comparison: Comparison) -> str:
 
 
 def published_table(comparison: Comparison) -> Table | None:
-    """Published figures beside ours; None on other cycles or without the cases."""
-    statements = published_beside(comparison.rows) if comparison.cycle == CYCLE else []
+    """Published figures beside ours; None on other cycles, without the reference or the cases."""
+    statements = published_beside(comparison)
     if not statements:
         return None
     title = "published study (Millo, Rolando, Andreata 2011) beside ours, nothing tuned"
@@ -214,21 +217,40 @@ def write_table(path: Path, problem: Problem) -> None:
     write_whole(path, contents.getvalue())
 
 
+def check_writable(path: Path) -> Path:
+    """The file that a path stands for, links followed; DataError where `write_whole` could not write it."""
+    try:
+        target = path.resolve()
+        if target.is_dir():
+            fault = "Is a folder"
+        elif target.exists() and not target.is_file():
+            fault = "Not a regular file"
+        elif target.exists() and not os.access(target, os.W_OK):
+            fault = "Read-only file"
+        elif not target.parent.is_dir():
+            fault = "No such folder"
+        elif not os.access(target.parent, os.W_OK):
+            fault = "Read-only folder"
+        else:
+            return target
+    except OSError as error:
+        fault = str(error.strerror)
+    except RuntimeError:
+        fault = "Links in a circle"
+    raise DataError(f"{path}: cannot be written ({fault}); choose another place")
+
+
 def write_whole(path: Path, contents: bytes) -> None:
     """Write a file at once: killed in the middle, the old one is whole."""
-    temporary = None
+    target, temporary = check_writable(path), None
     try:
-        with tempfile.NamedTemporaryFile(
-            dir=path.parent, prefix=f".{path.name}.", delete=False
-        ) as f:
+        with tempfile.NamedTemporaryFile(dir=target.parent, prefix=".hevopt.", delete=False) as f:
             temporary = Path(f.name)
             f.write(contents)
             f.flush()
             os.fsync(f.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
+        temporary.chmod(_mode_of(target))
+        temporary.replace(target)
     except OSError as error:
         raise DataError(
             f"{path}: cannot be written ({error.strerror}); choose another place"
@@ -236,6 +258,14 @@ def write_whole(path: Path, contents: bytes) -> None:
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+def _mode_of(target: Path) -> int:
+    if target.exists():
+        return stat.S_IMODE(target.stat().st_mode)
+    umask = os.umask(0)
+    os.umask(umask)
+    return 0o666 & ~umask
 
 
 def _plain(value: Any) -> Any:

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from math import isfinite
 from pathlib import Path
 from time import perf_counter
 
 from hevopt.architecture import Architecture, load_architecture
 from hevopt.certificate import Certificate, certify
-from hevopt.cycle import Cycle, load_cycle
+from hevopt.cycle import DISTANCE_MIN_M, Cycle, load_cycle
 from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
 from hevopt.files import shipped_names
 from hevopt.powertrain import build_problem
@@ -18,11 +19,15 @@ from hevopt.units import litres_per_100km
 
 NEUTRAL_PERCENT = 1.0
 REFERENCE_ARCHITECTURE = "A"
+# A percentage of less than this is none: the figure it would stand beside is rounding.
+_TINY = 1e-9
+_ROUNDING_J = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One architecture and strategy. None where a case failed, or where there is no reference.
+    """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
+    no reference, no fuel, or a bound of 0.
 
     status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy), "shortfall" (steps
     driven with less than the cycle asks), joined by commas, or "failed: ..." with the reason
@@ -84,12 +89,15 @@ def compare(
     """
     if not isinstance(cycle, Cycle):
         cycle = load_cycle(cycle)
-    names = shipped_names("architectures", ".toml") if architectures is None else architectures
-    cars = [a if isinstance(a, Architecture) else load_architecture(a) for a in names]
-    if not cars:
-        raise DataError("no architecture given; name at least one")
-    for name in strategies or ():
-        strategy_named(name)
+    if cycle.distance_m < DISTANCE_MIN_M:
+        raise DataError(
+            f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
+        )
+    if strategies is not None:
+        _check_strategies(strategies)
+    cars = _cars(
+        shipped_names("architectures", ".toml") if architectures is None else architectures
+    )
     plans = [(car, list(strategies or fitting(car.functions))) for car in cars]
     total, done = sum(len(names) for _, names in plans), 0
     rows: list[Row] = []
@@ -118,6 +126,31 @@ def compare(
     return Comparison(cycle.name, rows, failures, nox_weight, reference)
 
 
+def _cars(wanted: Sequence[Architecture | str | Path]) -> list[Architecture]:
+    """The architectures, no two of one name: rows are told apart by it."""
+    cars = [a if isinstance(a, Architecture) else load_architecture(a) for a in wanted]
+    if not cars:
+        raise DataError("no architecture given; name at least one, or leave the list out for all")
+    by_name: dict[str, Architecture] = {}
+    for car in cars:
+        if car.name in by_name:
+            raise DataError(
+                f"architecture {car.name} is given twice, in {by_name[car.name].source} and in "
+                f"{car.source}; leave one out, or change its name"
+            )
+        by_name[car.name] = car
+    return cars
+
+
+def _check_strategies(names: Sequence[str]) -> None:
+    if not names:
+        raise DataError("no strategy given; name at least one, or leave the list out for all")
+    for name in names:
+        strategy_named(name)
+        if list(names).count(name) > 1:
+            raise DataError(f"strategy {name} is given twice; name it once")
+
+
 def reference_certificate(problem: Problem) -> Certificate:
     """The certificate of a problem, with costate prices along dynamic programming's rollout."""
     return certify(problem, simulate(problem, dp.solve(problem).control))
@@ -131,7 +164,14 @@ def run_case(
     plan = strategy_named(strategy).solve(problem)
     solve_s = perf_counter() - began
     trajectory = simulate(problem, plan.control)
-    return _row(car, cycle, problem, certificate, strategy, trajectory, solve_s), plan, trajectory
+    row = _row(car, cycle, problem, certificate, strategy, trajectory, solve_s)
+    for name, value in row.as_dict().items():
+        if isinstance(value, float) and not isfinite(value):
+            raise SolverError(
+                f"{car.name} {strategy}: {name} is {value}; the figures of {car.source} are too far "
+                "from those of a car"
+            )
+    return row, plan, trajectory
 
 
 def _row(
@@ -145,7 +185,7 @@ def _row(
 ) -> Row:
     fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
     gained_j = trajectory.end_j - problem.start_j
-    energy_percent = 100 * gained_j / max(fuel_kg * car.engine.heating_value_jpkg, 1e-9)
+    fuel_j = fuel_kg * car.engine.heating_value_jpkg
     bound_kg, proof = certificate.bound_kg(trajectory.end_j)
 
     def litres(mass_kg: float) -> float:
@@ -154,17 +194,17 @@ def _row(
     return Row(
         architecture=car.name,
         strategy=strategy,
-        status=_status(problem, energy_percent),
+        status=_status(problem, gained_j, fuel_j),
         fuel_l_per_100km=litres(fuel_kg),
         co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
         nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km,
         soc_start=float(trajectory.soc[0]),
         soc_end=float(trajectory.soc[-1]),
-        delta_energy_percent=energy_percent,
+        delta_energy_percent=_percent(gained_j, fuel_j),
         fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * gained_j),
         engine_starts=engine_starts(problem, trajectory),
         bound_l_per_100km=litres(bound_kg),
-        gap_percent=100 * (trajectory.cost_kg - bound_kg) / max(abs(bound_kg), 1e-12),
+        gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
         certificate=proof,
         solve_s=solve_s,
     )
@@ -181,9 +221,13 @@ def engine_starts(problem: Problem, trajectory: Trajectory) -> int:
     return sum(now and not before for before, now in zip([start_on, *on], on, strict=False))
 
 
-def _status(problem: Problem, energy_percent: float) -> str:
+def _percent(part: float, whole: float) -> float | None:
+    return 100 * part / whole if whole > _TINY else None
+
+
+def _status(problem: Problem, gained_j: float, fuel_j: float) -> str:
     marks = []
-    if abs(energy_percent) > NEUTRAL_PERCENT:
+    if 100 * abs(gained_j) > max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J):
         marks.append("not neutral")
     missing = problem.table.missing_torque_nm
     if missing is not None and (missing > 0).any():
@@ -204,7 +248,9 @@ def _against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
     base = (named or good)[0]
 
     def change(value: float | None, reference: float | None) -> float | None:
-        return None if value is None or not reference else 100 * (value / reference - 1)
+        if value is None or reference is None or reference < _TINY:
+            return None
+        return 100 * (value / reference - 1)
 
     changed = [
         Row(

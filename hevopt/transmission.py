@@ -14,6 +14,8 @@ class Gearbox:
 
     ratios, efficiency: (gear + 1,) input to wheels, index 0 for neutral
     up_mps, down_mps: (gear - 1,) speeds of the change up from, and down to, gears 1, 2, ...
+    shift_fuel_kg, engine_speed_min_radps: cost of a change and lowest engine speed above first gear, where the
+    gear is a control; None where it cannot be one
     """
 
     name: str
@@ -22,6 +24,8 @@ class Gearbox:
     up_mps: Array
     down_mps: Array
     engage_before_launch_s: float
+    shift_fuel_kg: float | None = None
+    engine_speed_min_radps: float = 0.0
 
 
 def output_torque_nm(input_nm: Array, ratio: Array, efficiency: Array) -> Array:

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import os
+import resource
 import subprocess
 import sys
 
@@ -83,7 +85,15 @@ def test_names_and_paths_work_from_any_directory(monkeypatch, capsys, tmp_path):
 
 
 def test_a_nox_weight_lowers_nox_and_keeps_the_bound_below(monkeypatch, capsys):
-    words = ("compare", "--architectures", "C2", "--strategies", "dp,ecms", "--json", "--nox-weight")
+    words = (
+        "compare",
+        "--architectures",
+        "C2",
+        "--strategies",
+        "dp,ecms",
+        "--json",
+        "--nox-weight",
+    )
     plain, priced = (
         json.loads(call(monkeypatch, capsys, *words, weight)[1])["rows"] for weight in ("0", "30")
     )
@@ -98,7 +108,42 @@ def test_help_loads_no_compiled_part():
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
-def test_a_closed_pipe_is_not_an_error_message():
-    command = f"{sys.executable} -m hevopt.cli cycles | head -1"
-    done = subprocess.run(command, shell=True, capture_output=True, text=True)
-    assert "Traceback" not in done.stderr and "cadc_motorway130" in done.stdout
+def cycles_into(file, **settings):
+    """`hevopt cycles` as a process of its own, its standard output the file."""
+    command = [sys.executable, "-m", "hevopt.cli", "cycles"]
+    return subprocess.run(command, stdout=file, stderr=subprocess.PIPE, text=True, **settings)
+
+
+def test_a_closed_pipe_is_not_an_error():
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = cycles_into(writer)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_full_disk_is_one_message(tmp_path):
+    def allow_no_bytes():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+    with (tmp_path / "full").open("w") as file:
+        done = cycles_into(file, preexec_fn=allow_no_bytes)
+    assert done.returncode == 2
+    assert done.stderr == "hevopt: error: cannot write to standard output (File too large)\n"
+
+
+def test_a_terminal_without_greek_letters_shows_the_table(tmp_path):
+    (tmp_path / "c.csv").write_text("time_s,speed_kmh\n0,0\n10,36\n20,36\n30,0\n")
+    command = [sys.executable, "-m", "hevopt.cli", "run", "A", "--cycle", tmp_path / "c.csv"]
+    ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(command, env=ascii_only, capture_output=True, text=True)
+    assert done.returncode == 0 and "?SOC" in done.stdout and done.stderr == ""
+
+
+@pytest.mark.parametrize("words", [("--architectures", "B"), ("--cycle", "us06")])
+def test_published_figures_stand_beside_their_own_cycle_and_reference_only(
+    monkeypatch, capsys, words
+):
+    words = ("compare", "--architectures", "A,B", *words, "--allow-shortfall")
+    status, out, _ = call(monkeypatch, capsys, *words)
+    assert status == 0 and "published" not in out

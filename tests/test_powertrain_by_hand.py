@@ -84,7 +84,7 @@ def usable(table, step=0, *, engine_on=None, machine_gear=None, level=None):
     return [
         int(i)
         for i in np.flatnonzero(table.reject[step] == 0)
-        if all(w is None or w == g for w, g in zip(wanted, table.controls[i], strict=True))
+        if all(w is None or w == g for w, g in zip(wanted, table.controls[i], strict=False))
     ]
 
 
