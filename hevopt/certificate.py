@@ -22,6 +22,8 @@ from hevopt.problem import Problem, Trajectory
 from hevopt.step_prices import costate_dual, lp_dual
 
 TARGET_GAP = 5e-4
+# What every bound speaks of: the table's controls, not a continuous split between them.
+SCOPE = "tabulated controls"
 LOWER_DP_NODES = (16_001, 64_001)
 # Share of the window within which a rollout counts as touching its end.
 _TOUCH = 2e-3

@@ -43,6 +43,13 @@ ShortfallOption = Annotated[
         "--allow-shortfall", help="Drive on where the car cannot follow, and mark the rows."
     ),
 ]
+GearOption = Annotated[
+    bool, typer.Option("--free-gear", help="The engine's gear is a control, not the cycle's.")
+]
+HorizonOption = Annotated[
+    float | None,
+    typer.Option("--horizon", help="Preview of the predictive strategies, s (default 20)."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead.")]
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
 
@@ -64,10 +71,12 @@ def compare(
     ] = None,
     strategies: Annotated[
         str | None,
-        typer.Option("--strategies", help="Names, separated by commas; default: all that fit."),
+        typer.Option("--strategies", help="Names, separated by commas, or all."),
     ] = None,
     nox_weight: NoxOption = 0.0,
     allow_shortfall: ShortfallOption = False,
+    free_gear: GearOption = False,
+    horizon: HorizonOption = None,
     json: JsonOption = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
@@ -80,6 +89,8 @@ def compare(
             _listed(strategies),
             nox_weight=nox_weight,
             allow_shortfall=allow_shortfall,
+            free_gear=free_gear,
+            horizon_s=horizon,
             progress=progress,
         )
     if json:
@@ -107,28 +118,29 @@ def run(
     ] = None,
     nox_weight: NoxOption = 0.0,
     allow_shortfall: ShortfallOption = False,
+    free_gear: GearOption = False,
+    horizon: HorizonOption = None,
     json: JsonOption = False,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
     from hevopt import report, study
     from hevopt.architecture import load_architecture
     from hevopt.cycle import load_cycle
-    from hevopt.powertrain import build_problem
     from hevopt.strategies import strategy_named
 
     strategy_named(strategy)
     car, trace = load_architecture(architecture), load_cycle(cycle)
+    car = car.with_free_gear() if free_gear else car
     if out is not None:
         _check_out(out, architecture, cycle)
     with _Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
-        problem = build_problem(car, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
-        certificate = study.reference_certificate(problem)
+        case = study.prepare(car, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
         progress(f"{car.name}: {strategy}", 0, 1)
-        row, plan, trajectory = study.run_case(car, trace, problem, certificate, strategy)
+        row, plan, trajectory = study.run_case(case, strategy, horizon)
     comparison = study.Comparison(trace.name, [row], {}, nox_weight, "nothing, a single run")
     if out is not None:
-        report.write_trajectory(out, problem, trajectory)
+        report.write_trajectory(out, case.problem, trajectory)
     if json:
         _write(report.comparison_json(comparison))
         return
@@ -148,6 +160,7 @@ def table(
     cycle: CycleOption = "nedc",
     nox_weight: NoxOption = 0.0,
     allow_shortfall: ShortfallOption = False,
+    free_gear: GearOption = False,
 ) -> None:
     """Write the control table of an architecture on a cycle, for other solvers."""
     from hevopt import report
@@ -156,6 +169,7 @@ def table(
     from hevopt.powertrain import build_problem
 
     car, trace = load_architecture(architecture), load_cycle(cycle)
+    car = car.with_free_gear() if free_gear else car
     _check_out(out, architecture, cycle)
     problem = build_problem(car, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
     report.write_table(out, problem)

@@ -6,10 +6,10 @@ grid can be computed that is non-increasing and below  min over u of f_u + V(x +
 
 1. Shift. Within cell i, between nodes i and i + 1, replace d_u(x) by a constant s_u,i at least as great. V does not
    increase, so h_u(x) = f_u + V(x + s_u,i) is below the true branch. s_u,i comes from an upper bound of d_u that is
-   linear in x over a piece of the window and rises with x, taken at the cell's right end: a tangent where r = -d / dt
-   is convex in x (step_prices.py), else the constant of the piece's highest voltage and lowest resistance.
-2. Nodes. W_i is the least over u of h_u at node i, under the shift of the cell to its right, and at the right end of
-   a piece also of the cell to its left. Greater shifts give smaller values, so W_i is below h_u under both.
+   linear in x over a piece of the window and rises with x, taken at the cell's right end: a tangent where r = -d /
+   dt is convex in x (step_prices.py), else the constant of the piece's highest voltage and lowest resistance.
+2. Nodes. W_i is the least over u of h_u at node i, under the shift of the cell to its right, and at the right end
+   of a piece also of the cell to its left. Greater shifts give smaller values, so W_i is below h_u under both.
 3. Breaks. V has its breaks at nodes, so with a constant shift k + a (0 <= a < 1) h_u has one break in the cell, a
    distance 1 - a from its left node, where its target is node i + k + 1 and its value f_u + V_i+k+1. Between nodes
    and break h_u is linear. So the straight line from W_i to W_i+1 is above h_u by at most
@@ -20,7 +20,8 @@ grid can be computed that is non-increasing and below  min over u of f_u + V(x +
 5. Modes. The least over modes of switching cost + W is concave in each cell wherever modes cross, so the line
    between its nodes is below it: no further correction.
 6. Ends. Above the top node V is constant: what does not fit is thrown away, a relaxation. Below the bottom node,
-   and for charge missing at the end, V rises with a steep but finite slope: a relaxation too, for infinity is above it.
+   and for charge missing at the end, V rises with a steep but finite slope: a relaxation too, for infinity is
+   above it.
 
 By induction from the end V at the first step, at the start's energy and mode, is below the cost of every plan that
 ends with at least the asked charge.

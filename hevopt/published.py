@@ -23,7 +23,7 @@ class Published(NamedTuple):
 
 def published_beside(comparison: Comparison) -> list[Published]:
     """The published statements with ours, where cycle and reference are theirs and the rows are there."""
-    if (comparison.cycle, comparison.reference) != (CYCLE, REFERENCE):
+    if (comparison.cycle, comparison.reference) != (CYCLE, REFERENCE) or comparison.free_gear:
         return []
     by_case = {(row.architecture, row.strategy): row for row in comparison.rows}
 

@@ -27,7 +27,7 @@ feasible, reject     True where the control can be used; reject: bits saying why
 mode                 (control,) discrete state the control leads to
 switch_fuel_kg       (mode, mode) [from, to] fuel of going from one mode to another, start_mode before step 0
 switch_allowed       (mode, mode) [from, to]
-controls             (control,) labels: engine on or off, machine gear, torque level
+controls             (control,) labels: engine on or off, engine gear (0: the cycle's), machine gear, torque level
 time_s, step_s       (time,) start and length of the steps
 soc_start, soc_end_min, soc_min, soc_max    state of charge: start, least at the end, window
 nox_weight           kg of fuel that a kg of NOx counts; objective = sum(fuel + switch_fuel + nox_weight nox)
@@ -88,7 +88,7 @@ def _cells(row: Row) -> list[str]:
         "-" if row.engine_starts is None else str(row.engine_starts),
         number(row.bound_l_per_100km, ".3f"),
         number(row.gap_percent, ".3f"),
-        row.certificate or "-",
+        (row.certificate or "-").split(",")[0],
         number(row.solve_s, ".2f"),
         row.status,
     ]
@@ -104,8 +104,8 @@ def comparison_notes(comparison: Comparison) -> str:
         "(multiplier of the dual).\n"
         f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
         "gap: how far the row is above it.\n"
-        "proof: one multiplier = one price on charge; costate prices = one per step, from the "
-        "costate equation."
+        "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
+        "lower-bound DP = a cost-to-go nowhere above the true one."
     )
 
 
@@ -175,6 +175,7 @@ def trajectory_columns(problem: Problem, trajectory: Trajectory) -> dict[str, An
     columns |= {
         "engine_on": [int(label.engine_on) for label in labels],
         "machine_gear": [label.machine_gear for label in labels],
+        "engine_gear_chosen": [label.engine_gear for label in labels],
         "level": [label.level for label in labels],
         "soc": trajectory.soc[:-1],
         "soc_after": trajectory.soc[1:],
@@ -197,7 +198,8 @@ def write_table(path: Path, problem: Problem) -> None:
     """The problem as .npz arrays, enough for another solver to repeat ours; documented in its README entry."""
     table, pack = problem.table, problem.battery
     labels = [
-        f"engine {'on' if c.engine_on else 'off'}, machine gear {c.machine_gear}, {c.level}"
+        f"engine {'on' if c.engine_on else 'off'}, engine gear {c.engine_gear}, "
+        f"machine gear {c.machine_gear}, {c.level}"
         for c in table.controls
     ]
     contents = io.BytesIO()

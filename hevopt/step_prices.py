@@ -7,8 +7,8 @@ for every choice of prices >= 0, a bound on every feasible plan:
            + p_T x_end - p_1 x_start
 
 with x within the SOC window (t = 0: x = x_start and no x term) and the switching costs exact, a shortest path over
-modes. g is positively homogeneous in p but for the costs, so a shape of p is scaled to the maximum of g (prices.py).
-
+modes. g is positively homogeneous in p but for the costs, so a shape of p is scaled to the maximum of g
+(prices.py).
 Shapes, both along a rollout:
     costate prices  p_t = p_t+1 (1 - dr_t/dx): then x is stationary where the rollout is
     LP prices       multipliers of the linear program that lets controls be mixed, ignores switching and keeps x
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from hevopt import _step_prices_kernels as kernels
 from hevopt import battery as battery_model
-from hevopt.choices import Choices, choices_of, without_dominated
+from hevopt.choices import choices_of, without_dominated
 from hevopt.errors import SolverError
 from hevopt.prices import Line, dual
 from hevopt.problem import Problem, Trajectory

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, fields
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from hevopt.architecture import Architecture, load_architecture
-from hevopt.certificate import Certificate, certify
+from hevopt.certificate import SCOPE, Certificate, certify
 from hevopt.cycle import DISTANCE_MIN_M, Cycle, load_cycle
 from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
 from hevopt.files import shipped_names
@@ -67,11 +68,24 @@ class Comparison:
     failures: dict[str, HevoptError] = field(default_factory=dict)
     nox_weight: float = 0.0
     reference: str | None = None
+    free_gear: bool = False
 
 
-def solve(problem: Problem, strategy: str = "dp") -> Plan:
-    """The plan of a strategy by name."""
-    return strategy_named(strategy).solve(problem)
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A car on a cycle, with the plan of dynamic programming and the certificate along its rollout."""
+
+    car: Architecture
+    cycle: Cycle
+    problem: Problem
+    certificate: Certificate
+    dp_plan: Plan
+    dp_s: float
+
+
+def solve(problem: Problem, strategy: str = "dp", **settings: Any) -> Plan:
+    """The plan of a strategy by name, with the settings that its `solve` names."""
+    return strategy_named(strategy).solve(problem, **settings)
 
 
 def compare(
@@ -81,10 +95,14 @@ def compare(
     *,
     nox_weight: float = 0.0,
     allow_shortfall: bool = False,
+    free_gear: bool = False,
+    horizon_s: float | None = None,
     progress: Callable[[str, int, int], None] = lambda text, done, total: None,
 ) -> Comparison:
-    """Every strategy (by default all that fit) on every architecture (by default the shipped ones).
+    """Every strategy (by default the usual ones that fit) on every architecture (by default the shipped ones).
 
+    strategies: names, or ["all"] for every one that fits. free_gear: the engine's gear is a control.
+    horizon_s: preview of the predictive strategies, by default their own.
     progress: called with what comes next, and how many cases of how many are done.
     """
     if not isinstance(cycle, Cycle):
@@ -93,22 +111,24 @@ def compare(
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
-    if strategies is not None:
+    every = list(strategies or ()) == ["all"]
+    if strategies is not None and not every:
         _check_strategies(strategies)
     cars = _cars(
         shipped_names("architectures", ".toml") if architectures is None else architectures
     )
-    plans = [(car, list(strategies or fitting(car.functions))) for car in cars]
+    cars = [car.with_free_gear() for car in cars] if free_gear else cars
+    plans = [
+        (car, fitting(car.functions, every=every) if every or not strategies else list(strategies))
+        for car in cars
+    ]
     total, done = sum(len(names) for _, names in plans), 0
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
     for car, wanted in plans:
         progress(f"{car.name}: table and certificate", done, total)
         try:
-            problem = build_problem(
-                car, cycle, nox_weight=nox_weight, allow_shortfall=allow_shortfall
-            )
-            certificate = reference_certificate(problem)
+            case = prepare(car, cycle, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
         except (InfeasibleError, SolverError) as error:
             failures[car.name] = error
             rows += [_failed(car, name, error) for name in wanted]
@@ -117,13 +137,13 @@ def compare(
         for name in wanted:
             progress(f"{car.name}: {name}", done, total)
             try:
-                rows.append(run_case(car, cycle, problem, certificate, name)[0])
+                rows.append(run_case(case, name, horizon_s)[0])
             except (InfeasibleError, SolverError) as error:
                 failures[f"{car.name} {name}"] = error
                 rows.append(_failed(car, name, error))
             done += 1
     rows, reference = _against_reference(rows)
-    return Comparison(cycle.name, rows, failures, nox_weight, reference)
+    return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear)
 
 
 def _cars(wanted: Sequence[Architecture | str | Path]) -> list[Architecture]:
@@ -151,38 +171,57 @@ def _check_strategies(names: Sequence[str]) -> None:
             raise DataError(f"strategy {name} is given twice; name it once")
 
 
-def reference_certificate(problem: Problem) -> Certificate:
-    """The certificate of a problem, with costate prices along dynamic programming's rollout."""
-    return certify(problem, simulate(problem, dp.solve(problem).control))
+def prepare(
+    car: Architecture, cycle: Cycle, *, nox_weight: float = 0.0, allow_shortfall: bool = False
+) -> Case:
+    """The problem of a car on a cycle, solved by dynamic programming and certified."""
+    problem = build_problem(car, cycle, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
+    began = perf_counter()
+    plan = dp.solve(problem)
+    dp_s = perf_counter() - began
+    certificate = certify(problem, simulate(problem, plan.control))
+    return Case(car, cycle, problem, certificate, plan, dp_s)
 
 
 def run_case(
-    car: Architecture, cycle: Cycle, problem: Problem, certificate: Certificate, strategy: str
+    case: Case, strategy: str, horizon_s: float | None = None
 ) -> tuple[Row, Plan, Trajectory]:
-    """One strategy on one problem: its row (no reference yet), plan and trajectory."""
-    began = perf_counter()
-    plan = strategy_named(strategy).solve(problem)
-    solve_s = perf_counter() - began
-    trajectory = simulate(problem, plan.control)
-    row = _row(car, cycle, problem, certificate, strategy, trajectory, solve_s)
+    """One strategy on a case: its row (no reference yet), plan and trajectory."""
+    plan, solve_s = case.dp_plan, case.dp_s
+    if strategy != "dp":
+        settings = _settings(case, strategy, horizon_s)
+        began = perf_counter()
+        plan = strategy_named(strategy).solve(case.problem, **settings)
+        solve_s = perf_counter() - began
+    trajectory = simulate(case.problem, plan.control)
+    row = _row(case, strategy, trajectory, solve_s)
     for name, value in row.as_dict().items():
         if isinstance(value, float) and not isfinite(value):
             raise SolverError(
-                f"{car.name} {strategy}: {name} is {value}; the figures of {car.source} are too far "
-                "from those of a car"
+                f"{case.car.name} {strategy}: {name} is {value}; the figures of {case.car.source} are "
+                "too far from those of a car"
             )
     return row, plan, trajectory
 
 
-def _row(
-    car: Architecture,
-    cycle: Cycle,
-    problem: Problem,
-    certificate: Certificate,
-    strategy: str,
-    trajectory: Trajectory,
-    solve_s: float,
-) -> Row:
+def _settings(case: Case, strategy: str, horizon_s: float | None) -> dict[str, Any]:
+    """What a strategy is told beyond the problem: its preview, the other cycles it may learn from."""
+    chosen = strategy_named(strategy)
+    settings: dict[str, Any] = {}
+    if chosen.previews and horizon_s is not None:
+        settings["horizon_s"] = horizon_s
+    if chosen.learns:
+        others = [name for name in shipped_names("cycles", ".csv") if name != case.cycle.name]
+        weight = case.problem.nox_weight
+        settings["training"] = [
+            build_problem(case.car, load_cycle(name), nox_weight=weight, allow_shortfall=True)
+            for name in others
+        ]
+    return settings
+
+
+def _row(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
+    car, cycle, problem, certificate = case.car, case.cycle, case.problem, case.certificate
     fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
     gained_j = trajectory.end_j - problem.start_j
     fuel_j = fuel_kg * car.engine.heating_value_jpkg
@@ -205,7 +244,7 @@ def _row(
         engine_starts=engine_starts(problem, trajectory),
         bound_l_per_100km=litres(bound_kg),
         gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
-        certificate=proof,
+        certificate=f"{proof}, {SCOPE}",
         solve_s=solve_s,
     )
 

@@ -4,29 +4,40 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from hevopt.errors import unknown_name
-from hevopt.problem import Plan, Problem
+from hevopt.problem import Plan
 from hevopt.strategies import baseline, conventional, dp, ecms, nox_cut, start_stop
 
 
 class Strategy(NamedTuple):
-    """How to solve, and the functions (Table 1) an architecture needs for the strategy to make sense."""
+    """How to solve, what is known while driving, and the functions (Table 1) an architecture needs for it.
 
-    solve: Callable[[Problem], Plan]
+    causal: decides each step without knowing more of the cycle than `knows` says
+    usual: part of a comparison that names no strategies
+    previews: takes horizon_s; learns: takes training, problems of the same car on other cycles
+    """
+
+    solve: Callable[..., Plan]
+    knows: str
     needs: frozenset[str]
-    excludes: frozenset[str]
+    excludes: frozenset[str] = frozenset()
+    causal: bool = False
+    usual: bool = True
+    previews: bool = False
+    learns: bool = False
 
 
 _HYBRID = frozenset({"power_management"})
 _STOP = frozenset({"start_stop"})
 _NONE: frozenset[str] = frozenset()
+_RULE = "present step; its parameters are calibrated on the cycle"
 
 STRATEGIES: dict[str, Strategy] = {
-    "baseline": Strategy(baseline.solve, _NONE, _STOP | _HYBRID),
-    "start_stop": Strategy(start_stop.solve, _STOP, _HYBRID),
-    "conventional": Strategy(conventional.solve, _HYBRID, _NONE),
-    "nox_cut": Strategy(nox_cut.solve, _HYBRID | {"nox_cut"}, _NONE),
-    "ecms": Strategy(ecms.solve, _STOP, _NONE),
-    "dp": Strategy(dp.solve, _STOP, _NONE),
+    "baseline": Strategy(baseline.solve, "present step", _NONE, _STOP | _HYBRID, causal=True),
+    "start_stop": Strategy(start_stop.solve, _RULE, _STOP, _HYBRID),
+    "conventional": Strategy(conventional.solve, _RULE, _HYBRID),
+    "nox_cut": Strategy(nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}),
+    "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
+    "dp": Strategy(dp.solve, "whole cycle", _STOP),
 }
 
 
@@ -37,10 +48,12 @@ def strategy_named(name: str) -> Strategy:
     return STRATEGIES[name]
 
 
-def fitting(functions: frozenset[str]) -> list[str]:
-    """Names of the strategies that make sense for an architecture's functions, in order."""
+def fitting(functions: frozenset[str], *, every: bool = False) -> list[str]:
+    """Names of the strategies that make sense for an architecture's functions: the usual ones, or every one."""
     return [
         name
         for name, strategy in STRATEGIES.items()
-        if strategy.needs <= functions and not strategy.excludes & functions
+        if strategy.needs <= functions
+        and not strategy.excludes & functions
+        and (every or strategy.usual)
     ]
