@@ -50,10 +50,15 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int = NODES) -
     """
     choices = without_dominated(choices_of(problem))
     low, high = problem.window_j
-    cell = (high - low) / (nodes - 1)
+    # Where a step can cross the whole window, smaller cells than its move would prove nothing more.
+    move_j = float(np.max(np.abs(choices.power_w), initial=0.0) * choices.step_s.max())
+    cell = max((high - low) / (nodes - 1), move_j / nodes)
     # The asked end charge is a node, and the grid reaches up to a cell beyond the window: a relaxation.
-    below = np.ceil((problem.end_min_j - low) / cell - 1e-9)
-    grid = problem.end_min_j + cell * (np.arange(nodes + 1) - below)
+    below, above = (
+        np.ceil(reach / cell - 1e-9)
+        for reach in (problem.end_min_j - low, high - problem.end_min_j)
+    )
+    grid = problem.end_min_j + cell * np.arange(-below, max(above, 1.0) + 1)
     slope = _STEEPNESS * max(price_kgpj, 1e-12)
     terminal = slope * np.maximum(problem.end_min_j - grid, 0.0)
     breaks, offset, rise = _move_bounds(problem, choices, grid, cell)
@@ -70,7 +75,7 @@ def _move_bounds(
     """Nodes that part the window into pieces, and per entry and piece an upper bound of its move in cells:
     offset + rise x node."""
     pieces = _PIECES if convex_in_energy(problem) else _PIECES_CURVED
-    pieces = min(pieces, (len(grid) - 1) // 2)
+    pieces = max(min(pieces, (len(grid) - 1) // 2), 1)
     breaks = np.arange(pieces + 1) * (len(grid) - 1) // pieces
     if convex_in_energy(problem):
         offset, rise = kernels.moves_by_tangents(
