@@ -13,9 +13,11 @@ moving with it by their price at the end; the last one for the asked end charge 
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 
+from hevopt.errors import SolverError
 from hevopt.lower_dp import lower_bound_kg
 from hevopt.prices import Line, one_price_dual
 from hevopt.problem import Problem, Trajectory
@@ -85,7 +87,9 @@ def _rungs(
     """Kinds of proof beyond the first two, in order of effort, and what adds each to the certificate."""
 
     def lines(shape: Callable[[Problem, Trajectory], list[Line]], kind: str) -> None:
-        certificate.proofs[kind] = shape(problem, rollout)
+        # Without prices there is no proof of this kind; the next one needs none.
+        with suppress(SolverError):
+            certificate.proofs[kind] = shape(problem, rollout)
 
     def lower(nodes: int, kind: str) -> None:
         bound = lower_bound_kg(problem, worth_kgpj, nodes=nodes)

@@ -75,19 +75,22 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     )  # fmt: skip
     entries, steps = len(step), choices.steps
     low, high = problem.window_j
-    # Columns: weight of every choice, then x_1 ... x_T. Rows: energy steps, then sums of weights.
-    rows = np.concatenate([step, np.arange(steps), np.arange(1, steps), steps + step])
-    columns = np.concatenate(
-        [
-            np.arange(entries),
-            entries + np.arange(steps),
-            entries + np.arange(steps - 1),
-            np.arange(entries),
-        ]
+    # Columns: weight of every choice, then x_1 ... x_T. Energy may be thrown away: rows <=.
+    ones, scale_j = np.ones(steps), high - low
+    following, present = entries + np.arange(steps), entries + np.arange(steps - 1)
+    energy_rows = csr_array(
+        (
+            np.concatenate([drain_j / scale_j, ones, -keep_j[1:]]),
+            (
+                np.concatenate([step, np.arange(steps), np.arange(1, steps)]),
+                np.concatenate([np.arange(entries), following, present]),
+            ),
+        ),
+        shape=(steps, entries + steps),
     )
-    scale_j = high - low
-    data = np.concatenate([drain_j / scale_j, np.ones(steps), -keep_j[1:], np.ones(entries)])
-    matrix = csr_array((data, (rows, columns)), shape=(2 * steps, entries + steps))
+    weight_rows = csr_array(
+        (np.ones(entries), (step, np.arange(entries))), shape=(steps, entries + steps)
+    )
     offset = (1.0 - keep_j) * rollout.energy_j[:-1] / scale_j
     offset[0] += keep_j[0] * problem.start_j / scale_j
     bounds = np.empty((entries + steps, 2))
@@ -96,12 +99,12 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     bounds[-1, 0] = problem.end_min_j / scale_j
     result = linprog(
         np.concatenate([choices.cost_kg, np.zeros(steps)]),
-        A_eq=matrix, b_eq=np.concatenate([offset, np.ones(steps)]), bounds=bounds, method="highs",
+        A_ub=energy_rows, b_ub=offset, A_eq=weight_rows, b_eq=ones, bounds=bounds, method="highs",
     )  # fmt: skip
     if result.status != 0:
         raise SolverError(f"HiGHS stopped with status {result.status}: {result.message}")
     # A joule more after step t saves p: the multiplier of its row is -p.
-    return np.maximum(-result.eqlin.marginals[:steps] / scale_j, 0.0)
+    return np.maximum(-result.ineqlin.marginals / scale_j, 0.0)
 
 
 def convex_in_energy(problem: Problem) -> bool:
