@@ -192,6 +192,39 @@ def architectures() -> None:
 
 
 @app.command()
+def strategies(
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Run them all on C2 and D over all shipped cycles; write a page."
+        ),
+    ] = None,
+) -> None:
+    """The strategies, and what each knows while it drives."""
+    from hevopt import report, study
+    from hevopt.files import shipped_names
+    from hevopt.strategies import STRATEGIES
+
+    if out is None:
+        for name, strategy in STRATEGIES.items():
+            kind = "causal" if strategy.causal else "offline"
+            _write(f"{name:13} {kind:8} knows: {strategy.knows}")
+        return
+    report.check_writable(out)
+    with _Progress() as progress:
+        comparisons = [
+            study.compare(
+                cycle, ["C2", "D"], ["all"], allow_shortfall=True,
+                progress=lambda text, done, total, c=cycle: progress(f"{c}, {text}", done, total),
+            )
+            for cycle in shipped_names("cycles", ".csv")
+        ]  # fmt: skip
+    steps = {c.cycle: study.steps_of(c.cycle) for c in comparisons}
+    report.write_whole(out, report.strategies_page(comparisons, steps).encode())
+    _write(f"written to {out}")
+
+
+@app.command()
 def cycles() -> None:
     """The shipped cycles, with duration, distance, top speed and whether they list gears."""
     from hevopt.cycle import load_cycle

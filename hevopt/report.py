@@ -6,7 +6,7 @@ import json
 import os
 import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from rich.text import Text
 from hevopt.errors import DataError
 from hevopt.problem import Plan, Problem, Trajectory
 from hevopt.published import published_beside
+from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison, Row
 
 TABLE_README = """hevopt control table. Arrays are (time, control) unless said otherwise.
@@ -127,6 +128,56 @@ def comparison_json(comparison: Comparison) -> str:
     """One object {"cycle", "rows"}; null where a figure does not exist."""
     rows = [row.as_dict() for row in comparison.rows]
     return json.dumps({"cycle": comparison.cycle, "rows": rows}, indent=1, allow_nan=False)
+
+
+def strategies_page(comparisons: Sequence[Comparison], steps: Mapping[str, int]) -> str:
+    """Markdown: what each strategy knows, what a step costs to run, what it loses against the bound.
+
+    steps: cycle -> number of its steps
+    """
+    cycles = [comparison.cycle for comparison in comparisons]
+    rows = {
+        (row.architecture, row.strategy, comparison.cycle): row
+        for comparison in comparisons
+        for row in comparison.rows
+    }
+    cars = list(dict.fromkeys(car for car, _, _ in rows))
+    names = [name for name in STRATEGIES if any(name == strategy for _, strategy, _ in rows)]
+    lines = [
+        "# Strategies",
+        "",
+        "Made by `hevopt strategies --out reports/strategies.md`. Gap: cost above the certified bound at the",
+        "row's own end charge, per cent; * not charge-neutral within 1 % of the fuel's energy; ! steps driven",
+        "short of the cycle. ms: median over cars and cycles, the control table built.",
+        "",
+        "| strategy | knows | causal | ms per step |",
+        "|---|---|---|---|",
+    ]
+    for name in names:
+        times = sorted(
+            1e3 * row.solve_s / steps[cycle]
+            for (_, strategy, cycle), row in rows.items()
+            if strategy == name and row.solve_s is not None
+        )
+        middle = f"{times[len(times) // 2]:.3f}" if times else "-"
+        causal = "yes" if STRATEGIES[name].causal else "no"
+        lines.append(f"| `{name}` | {STRATEGIES[name].knows} | {causal} | {middle} |")
+    for car in cars:
+        lines += ["", f"## {car}, gap %", "", "| strategy | " + " | ".join(cycles) + " |"]
+        lines.append("|---" * (len(cycles) + 1) + "|")
+        for name in names:
+            cells = [_gap_cell(rows.get((car, name, cycle))) for cycle in cycles]
+            lines.append(f"| `{name}` | " + " | ".join(cells) + " |")
+    return "\n".join([*lines, ""])
+
+
+def _gap_cell(row: Row | None) -> str:
+    if row is None or row.gap_percent is None:
+        return "-" if row is None else "failed"
+    marks = ("*" if "not neutral" in row.status else "") + (
+        "!" if "shortfall" in row.status else ""
+    )
+    return f"{row.gap_percent:.3f}{marks}"
 
 
 def calibration_table(plan: Plan) -> Table | None:

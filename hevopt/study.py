@@ -146,6 +146,11 @@ def compare(
     return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear)
 
 
+def steps_of(cycle: str | Path) -> int:
+    """Number of steps of a cycle."""
+    return len(load_cycle(cycle).time_s) - 1
+
+
 def _cars(wanted: Sequence[Architecture | str | Path]) -> list[Architecture]:
     """The architectures, no two of one name: rows are told apart by it."""
     cars = [a if isinstance(a, Architecture) else load_architecture(a) for a in wanted]

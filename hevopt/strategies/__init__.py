@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from hevopt.errors import unknown_name
 from hevopt.problem import Plan
-from hevopt.strategies import baseline, conventional, dp, ecms, nox_cut, start_stop
+from hevopt.strategies import baseline, conventional, convex, dp, ecms, nox_cut, start_stop
 
 
 class Strategy(NamedTuple):
@@ -38,6 +38,7 @@ STRATEGIES: dict[str, Strategy] = {
     "nox_cut": Strategy(nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}),
     "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
     "dp": Strategy(dp.solve, "whole cycle", _STOP),
+    "convex": Strategy(convex.solve, "whole cycle", _HYBRID, usual=False),
 }
 
 

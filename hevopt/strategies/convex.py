@@ -1,0 +1,156 @@
+"""Convex optimisation of the whole cycle: a bound from a relaxation, then a plan from convex splits.
+
+1. Relaxation: the convex model (_convex_model.py) with every mode open at every step and switching for nothing.
+   Each plan of the table is a point of it (the share of its mode is 1, its battery loses no less) and costs there
+   no more than it does; so its optimum is a bound on every plan. It is reported as the value of its dual, evaluated
+   afresh at the solver's multipliers (_convex_dual.py).
+2. Mode path: with the multipliers p_t as prices and the falls of energy of the trajectory at hand, the shortest
+   path over modes (Viterbi), switching costs included, gives engine on/off and gear. The prices are scaled to the
+   top of the dual that this defines, so that the path takes about the energy that is there: a mode path chosen at
+   prices of another mode path overshoots, and the next one would overshoot back. Where that path stands still,
+   or cannot keep to the window, the best rollout's takes its place.
+3. Split: the convex model with that mode path divides each step between engine and battery, and gives new
+   multipliers and a new trajectory. 2 and 3 repeat until no new mode path comes up.
+4. Back to the table: a rollout follows, from every trajectory E* found, the value function
+       V_t(m, E) = to_go_t(m) - p_t (E - E*_t) + stiffness max(p) (E - E*_t)² / 2
+   whose first term is the shortest path's. Prices alone would not do: hulls are nearly straight, so that many steps
+   change at one price. Some rollouts follow E* from slightly above, where missing the end by little would cost a
+   start. The cheapest rollout is the plan; each ends with the asked charge.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt import battery as battery_model
+from hevopt._prices_kernels import shortest_path
+from hevopt.choices import Choices, choices_of
+from hevopt.errors import InfeasibleError
+from hevopt.prices import dual, one_price_dual, step_of_entry
+from hevopt.problem import Plan, Problem
+from hevopt.simulation import total_cost_kg
+from hevopt.strategies._convex_model import SOLVER, Solution, optimum
+from hevopt.strategies._convex_parts import hulls_of
+from hevopt.strategies._rollout import Reach, reach_of, roll
+
+Array = NDArray[np.float64]
+ITERATIONS_MAX = 8
+# Rollouts are tried with each share by which the price rises over the band, and each height above the trajectory;
+# band and height are shares of the window.
+_STIFFNESS = (0.1, 1.0, 3.0, 10.0)
+_LIFTS = (0.0, 1e-4, 2e-4)
+_BAND = 0.1
+_NODES = 201
+# The dual's top is a kink: the paths on either side are found this far from it.
+_BESIDE_TOP = 1e-6
+
+
+class _Search:
+    """Rollouts around trajectories of one problem, and the cheapest of them."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.choices = choices_of(problem)
+        self.reach: Reach = reach_of(problem, self.choices, problem.end_min_j)
+        self.best_cost_kg, self.best_control = np.inf, None
+
+    def follow(self, solution: Solution) -> NDArray[np.int64]:
+        """(time,) modes of the shortest path under a solution's prices; rolls out around it on the way."""
+        modes, price, to_go = _mode_path(self.problem, self.choices, solution)
+        low, high = self.problem.window_j
+        # A mode without a way on is never entered: the reach is empty there.
+        to_go = np.where(np.isfinite(to_go), to_go, 0.0)
+        for lift in _LIFTS:
+            for stiffness in _STIFFNESS:
+                self._roll(solution.energy_j + lift * (high - low), price, to_go, stiffness)
+        return modes
+
+    def _roll(self, centre_j: Array, price_kgpj: Array, to_go: Array, stiffness: float) -> None:
+        low, high = self.problem.window_j
+        cell = 2 * _BAND * (high - low) / (_NODES - 1)
+        away = cell * (np.arange(_NODES) - _NODES // 2)
+        price = np.concatenate([price_kgpj[:1], price_kgpj])
+        bend = stiffness * float(price.max()) * away**2 / (2 * _BAND * (high - low))
+        value = to_go[:, :, None] - price[:, None, None] * away + bend
+        path = roll(self.problem, self.choices, self.reach, value, centre_j + away[0], cell)
+        control = self.choices.control[path]
+        cost_kg, _ = total_cost_kg(self.problem, control)
+        if cost_kg < self.best_cost_kg:
+            self.best_cost_kg, self.best_control = cost_kg, control
+
+
+def solve(problem: Problem) -> Plan:
+    """The cheapest rollout around the relaxation and the convex splits; its notes hold the relaxation's bound."""
+    search = _Search(problem)
+    guess = one_price_dual(problem)[-1].price_kgpj
+    relaxation = optimum(problem, hulls_of(search.choices), guess)
+    price_path = search.follow(relaxation)
+    split_kg, price, iterations, seen = None, relaxation.price_kgpj[-1], 0, set()
+    while iterations < ITERATIONS_MAX:
+        # A path of prices need not keep to the window; that of the best rollout does.
+        paths = [price_path, problem.table.mode[search.best_control]]
+        modes = next((path for path in paths if path.tobytes() not in seen), None)
+        if modes is None:
+            break
+        seen.add(modes.tobytes())
+        iterations += 1
+        try:
+            solution = optimum(problem, hulls_of(search.choices, modes), guess)
+        except InfeasibleError:
+            continue
+        value_kg = solution.value_kg + _switching_kg(problem, modes)
+        if split_kg is None or value_kg < split_kg:
+            split_kg, price = value_kg, solution.price_kgpj[-1]
+        price_path = search.follow(solution)
+    notes = {
+        "relaxation_kg": relaxation.bound_kg,
+        "split_kg": split_kg,
+        "iterations": iterations,
+        "price_kgpj": float(price),
+        "solver": SOLVER,
+    }
+    return Plan(search.best_control, notes)
+
+
+def _switching_kg(problem: Problem, modes: NDArray[np.int64]) -> float:
+    before = np.concatenate([[problem.start_mode], modes[:-1]])
+    return float(np.sum(problem.table.switch_fuel_kg[before, modes]))
+
+
+def _mode_path(
+    problem: Problem, choices: Choices, solution: Solution
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Modes (time,) of the shortest path under a solution's prices, the prices it took, its cost-to-go.
+
+    Of the paths on both sides of the dual's top, the one whose energy departs less from the trajectory's.
+    """
+    counts = choices.first[:, -1] - choices.first[:, 0]
+    drain_j = _drain_j(problem, choices, solution.energy_j)
+    excess_j = drain_j + np.repeat(np.diff(solution.energy_j), counts)
+    worth = np.repeat(solution.price_kgpj, counts) * excess_j
+    try:
+        top = dual(problem, choices, worth, 0.0, float(solution.price_kgpj[-1]))[-1].scale
+    except InfeasibleError:
+        top = 1.0
+    found = []
+    for scale in (top * (1 - _BESIDE_TOP), top * (1 + _BESIDE_TOP)):
+        _, path, to_go = shortest_path(
+            choices.first, choices.cost_kg + scale * worth, choices.switch_kg,
+            choices.switch_allowed, problem.start_mode,
+        )  # fmt: skip
+        found.append((abs(float(np.sum(worth[path]))), scale, path, to_go))
+    _, scale, path, to_go = min(found, key=lambda item: item[:2])
+    return problem.table.mode[choices.control[path]], scale * solution.price_kgpj, to_go
+
+
+def _drain_j(problem: Problem, choices: Choices, energy_j: Array) -> Array:
+    """(entry,) fall of stored energy at a trajectory's state of charge."""
+    pack = problem.battery
+    counts = choices.first[:, -1] - choices.first[:, 0]
+    soc = battery_model.soc(pack, np.clip(energy_j[:-1], *problem.window_j))
+    voltage, discharge, charge = (
+        np.repeat(np.interp(soc, pack.soc, curve), counts)
+        for curve in (pack.open_circuit_v, pack.discharge_ohm, pack.charge_ohm)
+    )
+    resistance = np.where(choices.power_w < 0, charge, discharge)
+    drain_w = battery_model.chemical_power_w(pack, choices.power_w, voltage, resistance)
+    return drain_w * step_of_entry(choices)
