@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from hevopt.errors import unknown_name
 from hevopt.problem import Plan
-from hevopt.strategies import baseline, conventional, convex, dp, ecms, nox_cut, start_stop
+from hevopt.strategies import baseline, conventional, convex, dp, ecms, mpc, nox_cut, start_stop
 
 
 class Strategy(NamedTuple):
@@ -39,6 +39,9 @@ STRATEGIES: dict[str, Strategy] = {
     "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
     "dp": Strategy(dp.solve, "whole cycle", _STOP),
     "convex": Strategy(convex.solve, "whole cycle", _HYBRID, usual=False),
+    "mpc": Strategy(
+        mpc.solve, "20 s ahead, or --horizon", _HYBRID, causal=True, usual=False, previews=True
+    ),
 }
 
 

@@ -1,0 +1,189 @@
+"""Compiled parts of receding-horizon control: hulls, fits, the neutral price of what was seen, the choice."""
+
+import numpy as np
+from numba import njit
+
+from hevopt._battery_kernels import chemical_power, state_at
+from hevopt._prices_kernels import shortest_path
+
+
+@njit(cache=True)
+def drains(first, power, step_s, energy, battery):
+    """(entry,) fall of stored energy of every choice at one stored energy."""
+    result = np.empty(len(power))
+    _, voltage, discharge, charging = state_at(energy, battery)
+    for k in range(len(first)):
+        for i in range(first[k, 0], first[k, -1]):
+            result[i] = step_s[k] * chemical_power(
+                power[i], voltage, discharge, charging, battery.coulombic_efficiency
+            )
+    return result
+
+
+@njit(cache=True)
+def falling_hull(first, cost, drain):
+    """Lower convex hull of each block's cost over drained energy, where cost falls: its entries and their starts.
+
+    first: (time, block + 1); returns (hull entry,) in order of drain and (time, block + 1)
+    """
+    steps, blocks = first.shape[0], first.shape[1] - 1
+    hull = np.empty(len(cost), dtype=np.int64)
+    starts = np.empty_like(first)
+    top = 0
+    for k in range(steps):
+        for m in range(blocks):
+            starts[k, m] = top
+            bottom = top
+            order = np.argsort(drain[first[k, m] : first[k, m + 1]], kind="mergesort")
+            for i in order + first[k, m]:
+                if top > bottom and drain[i] == drain[hull[top - 1]]:
+                    if cost[i] >= cost[hull[top - 1]]:
+                        continue
+                    top -= 1
+                elif top > bottom and cost[i] >= cost[hull[top - 1]]:
+                    continue
+                while top - bottom >= 2:
+                    a, b = hull[top - 2], hull[top - 1]
+                    rise, run = cost[i] - cost[a], drain[i] - drain[a]
+                    if (cost[b] - cost[a]) * run < rise * (drain[b] - drain[a]):
+                        break
+                    top -= 1
+                hull[top] = i
+                top += 1
+        starts[k, blocks] = top
+    return hull[:top], starts
+
+
+@njit(cache=True)
+def _parabola(x, y):
+    """Curvature (>= 0) and slope at 0 of the least-squares parabola through points; a line where there are two."""
+    centre = np.mean(x)
+    width = np.max(np.abs(x - centre))
+    if width == 0.0:
+        return 0.0, 0.0
+    u, v = (x - centre) / width, y - np.mean(y)
+    s2, s3, s4 = np.mean(u * u), np.mean(u**3), np.mean(u**4)
+    t1, t2 = np.mean(u * v), np.mean(u * u * v)
+    spread = s4 - s2 * s2 - s3 * s3 / s2
+    bend = (t2 - s3 * t1 / s2) / spread if len(x) > 2 and spread > 1e-9 else 0.0
+    bend = max(bend, 0.0)
+    slope = (t1 - bend * s3) / s2 / width
+    curvature = 2.0 * bend / width**2
+    return curvature, slope - curvature * centre
+
+
+@njit(cache=True)
+def fits(first, cost, drain, hull, starts):
+    """(time, mode, 5) of each block: least drain, drain of least cost, greatest drain, curvature and slope at 0
+    of a convex parabola through the hull of cost over drain; 0 where the block is empty.
+    """
+    steps, modes = first.shape[0], first.shape[1] - 1
+    result = np.zeros((steps, modes, 5))
+    for k in range(steps):
+        for m in range(modes):
+            if first[k, m] == first[k, m + 1]:
+                continue
+            points = hull[starts[k, m] : starts[k, m + 1]]
+            result[k, m, 0], result[k, m, 1] = drain[points[0]], drain[points[-1]]
+            result[k, m, 2] = np.max(drain[first[k, m] : first[k, m + 1]])
+            result[k, m, 3:] = _parabola(drain[points], cost[points])
+    return result
+
+
+@njit(cache=True)
+def neutral_prices(hull, starts, cost, drain, seen, least_price):
+    """(time,) price at which the steps seen by then, 0 to seen[k] - 1, would have drained nothing in all.
+
+    hull, starts: falling hulls of whole steps, all modes in one block. A step moves along its hull as the price
+    falls; the edges of all steps, steepest first, are walked until the drain is made good. Where the edges end
+    before that, the last one counts.
+    """
+    slope, width = np.empty(len(hull)), np.empty(len(hull))
+    result = np.empty(len(seen))
+    edges, step, total = 0, 0, 0.0
+    for k in range(len(seen)):
+        while step < seen[k]:
+            if starts[step, 1] > starts[step, 0]:
+                points = hull[starts[step, 0] : starts[step, 1]]
+                total += drain[points[0]]
+                edges = _merge(slope, width, edges, drain[points], cost[points])
+            step += 1
+        drained, j = total, 0
+        while j < edges - 1 and drained + width[j] < 0.0:
+            drained += width[j]
+            j += 1
+        result[k] = max(slope[j], least_price) if edges else least_price
+    return result
+
+
+@njit(cache=True)
+def _merge(slope, width, edges, drain, cost):
+    """Put the edges of one hull among the first `edges` of slope and width, steepest first; their new number."""
+    new = len(drain) - 1
+    i, to = edges - 1, edges + new - 1
+    for j in range(new - 1, -1, -1):
+        run = drain[j + 1] - drain[j]
+        steep = (cost[j] - cost[j + 1]) / run
+        while i >= 0 and slope[i] < steep:
+            slope[to], width[to] = slope[i], width[i]
+            i, to = i - 1, to - 1
+        slope[to], width[to] = steep, run
+        to -= 1
+    return edges + new
+
+
+@njit(cache=True)
+def best_mode_path(
+    first, cost, drain, switch_kg, allowed, start_mode, prices, price, gain, charge, unit
+):
+    """Of the shortest paths through a preview under each of `prices`, the one of least cost and terminal cost
+    price x unit x (-x + gain x²/2), x the charge at the end, in units; its total and entries (step,).
+    """
+    begin, end = first[0, 0], first[-1, -1]
+    least_total, best = np.inf, np.zeros(len(first), dtype=np.int64)
+    for p in prices:
+        priced = cost[begin:end] + p * drain[begin:end]
+        value, path, _ = shortest_path(first - begin, priced, switch_kg, allowed, start_mode)
+        if not np.isfinite(value):
+            break
+        fall = np.sum(drain[begin + path])
+        x = charge - fall / unit
+        total = value - p * fall + price * unit * (0.5 * gain * x * x - x)
+        if total < least_total:
+            least_total, best = total, begin + path
+    return least_total, best
+
+
+@njit(cache=True)
+def reachable_band(start, least_drain, greatest_drain, low, high):
+    """Bounds (step,) on energy: the window, opened just as far as the drains on hand cannot keep it."""
+    steps = len(least_drain)
+    bottom, top = np.empty(steps), np.empty(steps)
+    below = above = start
+    for t in range(steps):
+        below, above = below - greatest_drain[t], above - least_drain[t]
+        bottom[t], top[t] = min(low, above), max(high, below)
+        below, above = max(below, bottom[t]), min(above, top[t])
+    return bottom, top
+
+
+@njit(cache=True)
+def nearest_choice(choices, k, mode, modes, energy, band, slack, price, curvature, target, battery):
+    """Entry of least  cost + switching + price drain + curvature/2 (drain - target)²  among some modes.
+
+    Only entries that lead within their mode's band (mode, 2) of stored energy; -1 where there is none.
+    """
+    least, chosen = np.inf, -1
+    _, voltage, discharge, charging = state_at(energy, battery)
+    for n in modes:
+        for i in range(choices.first[k, n], choices.first[k, n + 1]):
+            drain = choices.step_s[k] * chemical_power(
+                choices.power_w[i], voltage, discharge, charging, battery.coulombic_efficiency
+            )
+            if not band[n, 0] - slack <= energy - drain <= band[n, 1] + slack:
+                continue
+            value = choices.cost_kg[i] + choices.switch_kg[mode, n] + price * drain
+            value += 0.5 * curvature * (drain - target) ** 2
+            if value < least:
+                least, chosen = value, i
+    return chosen
