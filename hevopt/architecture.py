@@ -6,396 +6,35 @@ shipped ones, and a path is relative to the file.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import inf
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
+from hevopt.architecture_files import (
+    ArchitectureFile,
+    BatteryFile,
+    CarFile,
+    CouplingFile,
+    CouplingKind,
+    EngineFile,
+    GearboxFile,
+    LinearVoltageFile,
+    MachineFile,
+)
 from hevopt.battery import Battery
-from hevopt.datafile import SHAPES, FileModel, Model, read_toml, shape_of
+from hevopt.datafile import Model, read_toml
 from hevopt.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
 from hevopt.errors import DataError
 from hevopt.files import find, is_path, shipped_folder, shown
 from hevopt.machine import Machine
 from hevopt.transmission import Gearbox
-from hevopt.units import TO_SI
+from hevopt.units import STANDARD_GRAVITY_MPS2, TO_SI
 from hevopt.vehicle import Vehicle
 
-Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
-CouplingKind = Literal[
-    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
-]
-
-
-def _on_one_line(text: str) -> str:
-    if not text.isprintable() or text.isspace():
-        raise ValueError("printable characters on one line are needed")
-    return text
-
-
-Number, List, Table = map(Tag, SHAPES)
-Shape = Discriminator(shape_of)
-Name = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_on_one_line)]
-Description = Annotated[str, Field(max_length=500), AfterValidator(_on_one_line)]
-# Wide bounds: their task is that no sum or square of what a file holds overflows.
-Fraction = Annotated[float, Field(ge=0.01, le=1)]
-Soc = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[float, Field(ge=1e-6, le=1e9)]
-NotNegative = Annotated[float, Field(ge=0, le=1e9)]
-Coefficient = Annotated[float, Field(ge=-1e6, le=1e6)]
-NotPositive = Annotated[float, Field(ge=-1e6, le=0)]
-Ratio = Annotated[float, Field(ge=0.01, le=50)]
-Curve = Annotated[list[Coefficient], Field(min_length=2, max_length=10_000)]
-Speeds = Annotated[
-    list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=2, max_length=10_000)
-]
 Built = TypeVar("Built")
-Ohm = Annotated[Annotated[NotNegative, Number] | Annotated[list[NotNegative], List], Shape]
 _MASS_MIN_KG = 50.0
-_MAP_MAX = 1e6
-# exp() of more than this overflows.
-_EXPONENT_MAX = 700.0
-
-
-class CouplingFile(FileModel):
-    """How the machine joins the shafts."""
-
-    kind: CouplingKind
-    second_clutch: bool | None = None
-    machine_ratio: Ratio | None = None
-    machine_efficiency: Fraction | None = None
-    disconnects_above_speed_max: bool = False
-    machine_shift_fuel_g: Annotated[float, Field(ge=0, le=10)] = 0.0
-
-    @model_validator(mode="after")
-    def _keys_of_kind(self):
-        needed = {
-            "gearbox_input": {"second_clutch"},
-            "gearbox_output": {"machine_ratio", "machine_efficiency"},
-        }.get(self.kind, set())
-        allowed = {
-            "gearbox_output": needed | {"disconnects_above_speed_max"},
-            "even_shaft": {"machine_shift_fuel_g"},
-        }.get(self.kind, needed)
-        given = self.model_fields_set - {"kind"}
-        if missing := needed - given:
-            raise ValueError(f"kind {self.kind!r} needs {', '.join(sorted(missing))}")
-        if extra := given - allowed:
-            raise ValueError(f"kind {self.kind!r} does not use {', '.join(sorted(extra))}")
-        return self
-
-
-class ArchitectureFile(FileModel):
-    """An architecture: its components' names, functions (Table 1) and coupling."""
-
-    name: Name
-    description: Description = ""
-    car: str
-    engine: str
-    gearbox: str
-    machine: str
-    battery: str
-    hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
-    functions: list[Function]
-    gear: Literal["cycle", "free"] = "cycle"
-    coupling: CouplingFile
-
-
-class RoadLoadFile(FileModel):
-    """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12)."""
-
-    rolling_c0: Annotated[float, Field(ge=0, le=0.2)] | None = None
-    rolling_c1_spm: Coefficient = 0.0
-    rolling_c2_s2pm2: Coefficient = 0.0
-    rolling_c3_s3pm3: Coefficient = 0.0
-    drag_area_m2: Annotated[float, Field(ge=0, le=20)] | None = None
-    air_density_kgpm3: Annotated[float, Field(ge=0.01, le=2)] = 1.2
-    coastdown_c0_n: Annotated[float, Field(ge=0, le=1e6)] | None = None
-    coastdown_c1_nspm: Coefficient = 0.0
-    coastdown_c2_ns2pm2: Coefficient = 0.0
-
-    @model_validator(mode="after")
-    def _one_form(self):
-        coastdown = {key for key in self.model_fields_set if key.startswith("coastdown")}
-        parts = self.model_fields_set - coastdown
-        whole = {"rolling_c0", "drag_area_m2"} <= parts or "coastdown_c0_n" in coastdown
-        if not whole or (coastdown and parts):
-            raise ValueError(
-                "give either rolling_c0 and drag_area_m2, or coastdown_c0_n, and no key of the other "
-                f"form; found: {', '.join(sorted(self.model_fields_set)) or 'none'}"
-            )
-        return self
-
-
-class CarFile(FileModel):
-    """A car without powertrain."""
-
-    name: Name
-    mass_kg: Annotated[float, Field(ge=50, le=100_000)]
-    tyre_radius_m: Annotated[float, Field(ge=0.1, le=1.5)]
-    wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
-    auxiliary_power_w: Annotated[float, Field(ge=0, le=50_000)]
-    road_load: RoadLoadFile
-
-
-class FuelFile(FileModel):
-    heating_value_mjpkg: Annotated[float, Field(ge=5, le=150)]
-    density_kgpl: Annotated[float, Field(ge=0.05, le=2)]
-    co2_kgpkg: Annotated[float, Field(ge=0, le=5)]
-
-
-class FullLoadFile(FileModel):
-    speed_rpm: Speeds
-    torque_nm: Curve
-
-    @model_validator(mode="after")
-    def _curve(self):
-        if len(self.speed_rpm) != len(self.torque_nm):
-            raise ValueError("speed_rpm and torque_nm must have one length")
-        if (np.diff(self.speed_rpm) <= 0).any():
-            raise ValueError("speed_rpm must increase")
-        if min(self.torque_nm) <= 0:
-            raise ValueError(f"every torque_nm must be > 0, found {min(self.torque_nm):g}")
-        return self
-
-
-class FuelCoefficientsFile(FileModel):
-    a: Annotated[float, Field(ge=0.01, le=10)]
-    b: Coefficient
-    c: Coefficient
-    a2: NotPositive
-    l: Annotated[float, Field(ge=-1e6, le=-1e-3)]  # noqa: E741
-    l2: NotPositive
-
-
-class NoxCoefficientsFile(FileModel):
-    m0: NotNegative
-    lo: NotNegative
-    hi: NotNegative
-    p0: Coefficient
-    p1: Coefficient
-    dp: Annotated[float, Field(ge=0.01, le=1e6)]
-
-
-class EngineGridFile(FileModel):
-    """A measured map: rows are speeds, columns torques; nan marks a cell that was not measured."""
-
-    speed_rpm: Speeds
-    torque_nm: Curve
-    fuel_gps: list[list[Annotated[float, Field(allow_inf_nan=True)]]]
-    nox_gps: list[list[Annotated[float, Field(allow_inf_nan=True)]]] | None = None
-    motoring_torque_nm: Curve
-
-    @model_validator(mode="after")
-    def _shapes(self):
-        shape = (len(self.speed_rpm), len(self.torque_nm))
-        for name in ("fuel_gps", "nox_gps"):
-            grid = getattr(self, name)
-            if grid is None:
-                continue
-            if len(grid) != shape[0] or any(len(row) != shape[1] for row in grid):
-                raise ValueError(f"{name} must have {shape[0]} rows of {shape[1]} values")
-            values = np.array(grid)
-            if np.isnan(values).all():
-                raise ValueError(f"{name} holds nan only; give the measured values")
-            if not (np.isnan(values) | ((values >= 0) & (values <= _MAP_MAX))).all():
-                raise ValueError(f"{name}: allowed: 0 to {_MAP_MAX:g}, or nan where not measured")
-        if len(self.motoring_torque_nm) != shape[0] or max(self.motoring_torque_nm) >= 0:
-            raise ValueError(f"motoring_torque_nm must be {shape[0]} values below 0")
-        if (np.diff(self.speed_rpm) <= 0).any() or (np.diff(self.torque_nm) <= 0).any():
-            raise ValueError("speed_rpm and torque_nm must increase")
-        return self
-
-
-class EngineFile(FileModel):
-    name: Name
-    displacement_cm3: Annotated[float, Field(ge=10, le=100_000)]
-    bore_mm: Annotated[float, Field(ge=10, le=1000)]
-    stroke_mm: Annotated[float, Field(ge=10, le=1000)]
-    idle_rpm: Annotated[float, Field(ge=50, le=5000)]
-    inertia_kgm2: Annotated[float, Field(ge=0, le=100)]
-    start_fuel_g: Annotated[float, Field(ge=0, le=100)]
-    fuel: FuelFile
-    full_load: FullLoadFile
-    fuel_coefficients: FuelCoefficientsFile | None = None
-    fuel_map: EngineGridFile | None = None
-    nox_coefficients: NoxCoefficientsFile | None = None
-
-    @model_validator(mode="after")
-    def _one_map(self):
-        if (self.fuel_coefficients is None) == (self.fuel_map is None):
-            raise ValueError("give either fuel_coefficients or fuel_map")
-        if self.fuel_map is not None and self.nox_coefficients is not None:
-            raise ValueError("with fuel_map, NOx is nox_gps in the map, not nox_coefficients")
-        low, high = self.full_load.speed_rpm[0], self.full_load.speed_rpm[-1]
-        if not low <= self.idle_rpm < high:
-            raise ValueError(
-                f"idle_rpm {self.idle_rpm:g} must lie within full_load.speed_rpm, {low:g} to {high:g}"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _fuel_at_every_speed(self):
-        """The p_mf equation (engine.py) has a root, and rising fuel, up to full load and top speed."""
-        if self.fuel_coefficients is None:
-            return self
-        k, curve = self.fuel_coefficients, self.full_load
-        rpm = np.union1d(np.linspace(0.0, curve.speed_rpm[-1], 201), curve.speed_rpm)
-        piston_mps = 2 * self.stroke_mm / 1e3 * rpm / 60
-        slope = k.a + k.b * piston_mps + k.c * piston_mps**2
-        torque = np.interp(rpm, curve.speed_rpm, curve.torque_nm)
-        full_bar = 4 * pi * torque / (self.displacement_cm3 * 1e-6) / 1e5
-        root = slope**2 + 4 * k.a2 * (full_bar - k.l - k.l2 * piston_mps**2)
-        if (slope <= 0).any():
-            raise ValueError(
-                f"fuel_coefficients: a + b cm + c cm² is {slope.min():.3g} at "
-                f"{rpm[np.argmin(slope)]:g} rpm; it must be > 0 from 0 to full_load's top speed"
-            )
-        if (root < 0).any():
-            raise ValueError(
-                f"fuel_coefficients: full load at {rpm[np.argmin(root)]:g} rpm has no fuel; lower "
-                "full_load.torque_nm or bring a2 closer to 0"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _nox_steepness(self):
-        k = self.nox_coefficients
-        if k is not None:
-            tops = [k.p0 + k.p1 * (rpm / 1000 - 2) for rpm in (0.0, self.full_load.speed_rpm[-1])]
-            if max(tops) > _EXPONENT_MAX * k.dp:
-                raise ValueError(
-                    f"nox_coefficients: (p0 + p1 (n/1000 - 2)) / dp reaches {max(tops) / k.dp:.3g} "
-                    f"by full_load's top speed; allowed: up to {_EXPONENT_MAX:g}; raise dp"
-                )
-        return self
-
-
-class ShiftSpeedsFile(FileModel):
-    up_kmh: list[Positive]
-    down_kmh: list[Positive]
-    engage_before_launch_s: Annotated[float, Field(ge=0, le=60)] = 1.0
-
-
-class FreeGearFile(FileModel):
-    """What limits a gear that the strategy chooses."""
-
-    shift_fuel_g: Annotated[float, Field(ge=0, le=10)]
-    engine_speed_min_rpm: Annotated[float, Field(ge=0, le=10_000)]
-
-
-class GearboxFile(FileModel):
-    name: Name
-    ratios: Annotated[list[Ratio], Field(min_length=1, max_length=20)]
-    final_drive_ratio: Ratio
-    efficiency: Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape]
-    shift_speeds: ShiftSpeedsFile
-    free_gear: FreeGearFile | None = None
-
-    @model_validator(mode="after")
-    def _lengths(self):
-        gears, shifts = len(self.ratios), self.shift_speeds
-        if isinstance(self.efficiency, list) and len(self.efficiency) != gears:
-            raise ValueError(f"efficiency needs one value or {gears}, one per gear")
-        if len(shifts.up_kmh) != gears - 1 or len(shifts.down_kmh) != gears - 1:
-            raise ValueError(f"shift_speeds need {gears - 1} values each for {gears} gears")
-        if list(self.ratios) != sorted(self.ratios, reverse=True):
-            raise ValueError("ratios must fall from first gear to last")
-        if any(d >= u for u, d in zip(shifts.up_kmh, shifts.down_kmh, strict=True)):
-            raise ValueError("each down_kmh must be below its up_kmh")
-        if sorted(shifts.up_kmh) != shifts.up_kmh or sorted(shifts.down_kmh) != shifts.down_kmh:
-            raise ValueError("shift speeds must rise from gear to gear")
-        return self
-
-
-class MachineFile(FileModel):
-    name: Name
-    kind: Literal["loss", "efficiency"]
-    power_max_w: Positive
-    torque_max_nm: Positive | None = None
-    speed_max_rpm: Positive | None = None
-    inertia_kgm2: Annotated[float, Field(ge=0, le=100)] = 0.0
-    efficiency: Fraction | None = None
-    loss_c0_w: NotNegative | None = None
-    loss_c1_ws: NotNegative | None = None
-    loss_c2_ws2: NotNegative | None = None
-    loss_c3_wpnm2: NotNegative | None = None
-
-    @model_validator(mode="after")
-    def _keys_of_kind(self):
-        losses = [self.loss_c0_w, self.loss_c1_ws, self.loss_c2_ws2, self.loss_c3_wpnm2]
-        if self.kind == "loss" and (None in losses or self.efficiency is not None):
-            raise ValueError(
-                "kind 'loss' needs loss_c0_w, loss_c1_ws, loss_c2_ws2, loss_c3_wpnm2 and no efficiency"
-            )
-        if self.kind == "efficiency" and (self.efficiency is None or any(losses)):
-            raise ValueError("kind 'efficiency' needs efficiency and no loss_c*")
-        return self
-
-
-class LinearVoltageFile(FileModel):
-    intercept: Positive
-    slope: NotNegative
-
-
-class SocFile(FileModel):
-    start: Soc
-    min: Soc
-    max: Soc
-
-    @model_validator(mode="after")
-    def _window(self):
-        if not self.min < self.max:
-            raise ValueError(f"empty window: min {self.min:g} must be below max {self.max:g}")
-        if not self.min <= self.start <= self.max:
-            raise ValueError(f"start {self.start:g} must lie in [{self.min:g}, {self.max:g}]")
-        return self
-
-
-class BatteryFile(FileModel):
-    """A battery of equal cells in series, figures per cell, over SOC where they are lists."""
-
-    name: Name
-    cells_in_series: Annotated[int, Field(ge=1, le=10_000)]
-    capacity_ah: Positive
-    open_circuit_v: Annotated[
-        Annotated[LinearVoltageFile, Table] | Annotated[list[Positive], List], Shape
-    ]
-    resistance_ohm: Ohm | None = None
-    discharge_ohm: Ohm | None = None
-    charge_ohm: Ohm | None = None
-    curve_soc: list[Soc] | None = None
-    coulombic_efficiency: Fraction = 1.0
-    power_max_w: Positive | None = None
-    current_max_a: Positive | None = None
-    soc: SocFile
-
-    @model_validator(mode="after")
-    def _curves(self):
-        given = self.model_fields_set & {"resistance_ohm", "discharge_ohm", "charge_ohm"}
-        if given not in ({"resistance_ohm"}, {"discharge_ohm", "charge_ohm"}):
-            raise ValueError(
-                "give either resistance_ohm, or discharge_ohm and charge_ohm; found: "
-                f"{', '.join(sorted(given)) or 'none'}"
-            )
-        lists = [v for v in (self.open_circuit_v, *self.resistances()) if isinstance(v, list)]
-        if lists and self.curve_soc is None:
-            raise ValueError("values over SOC need curve_soc")
-        if any(len(v) != len(self.curve_soc) for v in lists):
-            raise ValueError(f"values over SOC need {len(self.curve_soc)} entries, as curve_soc")
-        if self.curve_soc is not None and (
-            len(self.curve_soc) < 2 or (np.diff(self.curve_soc) <= 0).any()
-        ):
-            raise ValueError("curve_soc must increase and have at least 2 entries")
-        return self
-
-    def resistances(self) -> tuple:
-        """Discharge and charge resistance as given."""
-        if self.resistance_ohm is not None:
-            return self.resistance_ohm, self.resistance_ohm
-        return self.discharge_ohm, self.charge_ohm
 
 
 @dataclass(frozen=True, slots=True)
@@ -509,7 +148,7 @@ def _vehicle(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
         rolling = (0.0, 0.0, 0.0, 0.0)
         air = (load.coastdown_c0_n, load.coastdown_c1_nspm, load.coastdown_c2_ns2pm2, 0.0)
     else:
-        weight_n = mass_kg * 9.80665
+        weight_n = mass_kg * STANDARD_GRAVITY_MPS2
         polynomial = (
             load.rolling_c0,
             load.rolling_c1_spm,

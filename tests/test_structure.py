@@ -19,7 +19,7 @@ LAYERS = [
     ["files"],
     ["datafile", "cycle"],
     ["_battery_kernels"],
-    ["vehicle", "engine", "machine", "battery", "transmission"],
+    ["vehicle", "engine", "machine", "battery", "transmission", "architecture_files"],
     ["architecture", "problem"],
     ["demand", "_choices_kernels", "_prices_kernels", "_step_prices_kernels"],
     ["driver", "choices"],
