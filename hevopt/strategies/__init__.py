@@ -5,7 +5,18 @@ from typing import NamedTuple
 
 from hevopt.errors import unknown_name
 from hevopt.problem import Plan
-from hevopt.strategies import baseline, conventional, convex, dp, ecms, mpc, nox_cut, start_stop
+from hevopt.strategies import (
+    a_ecms,
+    baseline,
+    conventional,
+    convex,
+    dp,
+    ecms,
+    mpc,
+    nox_cut,
+    sdp,
+    start_stop,
+)
 
 
 class Strategy(NamedTuple):
@@ -41,6 +52,10 @@ STRATEGIES: dict[str, Strategy] = {
     "convex": Strategy(convex.solve, "whole cycle", _HYBRID, usual=False),
     "mpc": Strategy(
         mpc.solve, "20 s ahead, or --horizon", _HYBRID, causal=True, usual=False, previews=True
+    ),
+    "a_ecms": Strategy(a_ecms.solve, "past and present", _HYBRID, causal=True, usual=False),
+    "sdp": Strategy(
+        sdp.solve, "past and present; other cycles", _HYBRID, causal=True, usual=False, learns=True
     ),
 }
 

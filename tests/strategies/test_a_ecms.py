@@ -1,0 +1,142 @@
+"""Adaptive ECMS: causal, within the window, neutral by its own feedback, and never below the bound."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import CYCLES, HYBRIDS
+from problems import random_problem
+
+from hevopt import Battery, ControlTable, DataError, Problem, certify, simulate
+from hevopt.problem import Signals
+from hevopt.strategies import _causal_kernels as kernels
+from hevopt.strategies import a_ecms, dp
+
+HEATING_VALUE_JPKG = 42.9e6
+CUTS = (1, 137, 400, 800)
+
+
+def rows(problem: Problem, order: np.ndarray) -> Problem:
+    """The problem with other rows, in the order given; start times and missing torque left out of it."""
+    table = problem.table
+    signals = Signals(
+        *(
+            getattr(table.signals, n)[order]
+            for n in ("speed_mps", "wheel_power_w", "gear", "clutch_open")
+        )
+    )
+    step_s = table.step_s[order]
+    changed = replace(
+        table,
+        time_s=np.cumsum(step_s) - step_s,
+        step_s=step_s,
+        fuel_kg=table.fuel_kg[order],
+        nox_kg=table.nox_kg[order],
+        battery_power_w=table.battery_power_w[order],
+        reject=table.reject[order],
+        signals=signals,
+        flows={},
+        missing_torque_nm=None,
+    )
+    return replace(problem, table=changed)
+
+
+def gained_percent(problem, trajectory) -> float:
+    fuel_j = trajectory.total_fuel_kg * HEATING_VALUE_JPKG
+    return 100 * (trajectory.end_j - problem.start_j) / fuel_j
+
+
+@pytest.mark.parametrize("architecture", ["C2", "E"])
+@pytest.mark.parametrize("window_s", [None, 120.0])
+def test_a_decision_does_not_change_when_the_cycle_after_it_changes(
+    problem_of, architecture, window_s
+):
+    problem = problem_of(architecture, "nedc")
+    steps = np.arange(len(problem.table.step_s))
+    plan = a_ecms.solve(problem, window_s=window_s).control
+    rng = np.random.default_rng(3)
+    for cut in CUTS:
+        shuffled = np.concatenate([steps[:cut], rng.permutation(steps[cut:])])
+        for order in (steps[:cut], shuffled, np.concatenate([steps[:cut], steps[::-1]])):
+            other = a_ecms.solve(rows(problem, order), window_s=window_s).control
+            np.testing.assert_array_equal(other[:cut], plan[:cut])
+
+
+@pytest.mark.parametrize("architecture", ["C2", "D"])
+@pytest.mark.parametrize("cycle", ["nedc", "wltc_class3b"])
+def test_charge_is_neutral_by_feedback_alone(problem_of, architecture, cycle):
+    problem = problem_of(architecture, cycle)
+    trajectory = simulate(problem, a_ecms.solve(problem).control)
+    assert abs(gained_percent(problem, trajectory)) <= 1.0
+
+
+@pytest.mark.parametrize("architecture", HYBRIDS)
+@pytest.mark.parametrize("cycle", CYCLES)
+def test_loss_is_positive_and_small_on_every_shipped_cycle(problem_of, architecture, cycle):
+    problem = problem_of(architecture, cycle)
+    certificate = certify(problem, simulate(problem, dp.solve(problem).control))
+    trajectory = simulate(problem, a_ecms.solve(problem).control)
+    bound, _ = certificate.bound_kg(trajectory.end_j)
+    gap = 100 * (trajectory.cost_kg / bound - 1)
+    print(
+        f"{architecture} {cycle}: gap {gap:.2f} %, charge {gained_percent(problem, trajectory):+.2f} %"
+    )
+    assert 0 <= gap < 4.0
+    assert abs(gained_percent(problem, trajectory)) < 3.0
+
+
+def test_the_moving_base_also_keeps_the_window_and_loses_little(problem_of):
+    problem = problem_of("C2", "wltc_class3b")
+    fixed, moving = (a_ecms.solve(problem, window_s=w) for w in (None, 300.0))
+    assert not np.array_equal(fixed.control, moving.control)
+    cost = [simulate(problem, plan.control).cost_kg for plan in (fixed, moving)]
+    assert cost[1] < 1.02 * cost[0]
+
+
+def test_a_factor_over_past_steps_matches_the_drain_that_is_asked():
+    """Two controls a step, 1 g for 20 kJ more: below 0.05 mg/J every step drains, above none does."""
+    first = np.array([[0, 2], [2, 4]])
+    cost, drain = np.array([0.0, 1e-3, 0.0, 3e-3]), np.array([2e4, 0.0, 2e4, 0.0])
+    for wanted, expected in ((2.5e4, 5e-8), (1e4, 1.5e-7)):
+        factor = kernels.neutral_factor(first, cost, drain, 0, 2, wanted, 1e-8, 1e-6)
+        assert factor == pytest.approx(expected, rel=0.01)
+
+
+def test_same_input_same_plan(problem_of):
+    problem = problem_of("E", "udds")
+    plans = [a_ecms.solve(problem) for _ in range(2)]
+    np.testing.assert_array_equal(plans[0].control, plans[1].control)
+    assert plans[0].notes == plans[1].notes
+
+
+def test_window_is_kept_where_a_control_keeps_it():
+    """A tiny battery, cheap controls that would empty or overfill it at once, and one that is neutral."""
+    rng = np.random.default_rng(0)
+    power = np.column_stack([rng.uniform(-3e3, 3e3, 400), np.zeros(400)])
+    fuel = np.column_stack([np.zeros(400), np.full(400, 1e-3)])
+    battery = Battery(
+        np.array([0.0, 1.0]),
+        np.full(2, 100.0),
+        np.full(2, 0.1),
+        np.full(2, 0.1),
+        200.0,
+        1.0,
+        0.4,
+        0.6,
+    )
+    problem = Problem(ControlTable.from_arrays(fuel, power), battery, 0.5, 0.5)
+    trajectory = simulate(problem, a_ecms.solve(problem).control)
+    assert trajectory.soc.min() >= 0.4 and trajectory.soc.max() <= 0.6
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_control_taken_is_feasible_on_tables_without_signals(seed):
+    problem = random_problem(seed)
+    control = a_ecms.solve(problem).control
+    assert problem.table.feasible[np.arange(len(control)), control].all()
+
+
+@pytest.mark.parametrize("window_s", [0.0, -5.0, float("nan")])
+def test_a_window_that_is_none_is_refused(problem_of, window_s):
+    with pytest.raises(DataError, match="window_s"):
+        a_ecms.solve(problem_of("C2", "nedc"), window_s=window_s)
