@@ -21,6 +21,8 @@ from hevopt.published import published_beside
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison, Row
 
+_CAUSAL_MARK = "†"
+
 TABLE_README = """hevopt control table. Arrays are (time, control) unless said otherwise.
 fuel_kg, nox_kg      burnt and emitted in the step; finite also where not feasible
 battery_power_w      at the terminals during the step, > 0 discharges
@@ -77,7 +79,7 @@ def _cells(row: Row) -> list[str]:
     change = None if row.soc_end is None else row.soc_end - row.soc_start
     return [
         row.architecture,
-        row.strategy,
+        row.strategy + (_CAUSAL_MARK if STRATEGIES[row.strategy].causal else ""),
         number(row.fuel_l_per_100km, ".3f"),
         number(row.delta_fuel_percent, "+.1f"),
         number(row.co2_g_per_km, ".1f"),
@@ -105,6 +107,7 @@ def comparison_notes(comparison: Comparison) -> str:
         "(multiplier of the dual).\n"
         f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
         "gap: how far the row is above it.\n"
+        f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
         "lower-bound DP = a cost-to-go nowhere above the true one."
     )

@@ -86,7 +86,7 @@ def architecture(key: str, old: str, new: str) -> None:
         (["--cycle", "nedcc"], ["cycle 'nedcc' not found", "close matches: nedc;", "us06"]),
         (["--cycle", "NEDC"], ["close matches: nedc;"]),
         (["--architectures", "A,c2"], ["architecture 'c2'", "close matches: C2;", "A, B, C1"]),
-        (["--strategies", "dp,ecmss"], ["strategy 'ecmss'", "close matches: ecms;", "baseline"]),
+        (["--strategies", "dp,ecmss"], ["strategy 'ecmss'", "close matches: ecms", "baseline"]),
         (["--cycle", "no.csv"], ["no.csv does not exist", ".csv file or a name"]),
         (["--cycle", "."], ["'.' not found"]),
         (["--cycle", ""], ["name '' is empty"]),
