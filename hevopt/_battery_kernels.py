@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from hevopt._compile import compiled
 
 
 class BatteryArrays(NamedTuple):
@@ -19,7 +20,7 @@ class BatteryArrays(NamedTuple):
     coulombic_efficiency: float
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def state_at(energy, battery):
     """SOC, open-circuit voltage, discharge and charge resistance at a stored energy."""
     i = 0
@@ -37,7 +38,7 @@ def state_at(energy, battery):
     return soc, voltage, discharge, charging
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def chemical_power(power, voltage, discharge, charging, efficiency):
     """Rate at which stored energy falls; NaN beyond what the voltage can deliver."""
     resistance = charging if power < 0.0 else discharge
@@ -48,14 +49,14 @@ def chemical_power(power, voltage, discharge, charging, efficiency):
     return efficiency * chemical if power < 0.0 else chemical
 
 
-@njit(cache=True)
+@compiled()
 def chemical_power_at(power, energy, battery):
     """Rate at which stored energy falls for a terminal power at a stored energy."""
     _, voltage, discharge, charging = state_at(energy, battery)
     return chemical_power(power, voltage, discharge, charging, battery.coulombic_efficiency)
 
 
-@njit(cache=True)
+@compiled()
 def trace(start_j, power_w, step_s, battery):
     """Stored energy after every step, (time + 1,), by the step all parts of hevopt share."""
     energy = np.empty(len(power_w) + 1)

@@ -1,10 +1,11 @@
 """Compiled filter of dominated choices; see choices.py."""
 
 import numpy as np
-from numba import njit
+
+from hevopt._compile import compiled
 
 
-@njit(cache=True)
+@compiled()
 def undominated(first, cost, power):
     """Entries kept, by rising power within each block, and their new block starts."""
     steps, blocks = first.shape

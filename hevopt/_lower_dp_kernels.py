@@ -1,13 +1,13 @@
 """Compiled parts of the lower-bound dynamic program; the proof is in lower_dp.py."""
 
 import numpy as np
-from numba import njit
 
 from hevopt._battery_kernels import chemical_power
+from hevopt._compile import compiled
 from hevopt._step_prices_kernels import drain_and_slope
 
 
-@njit(cache=True)
+@compiled()
 def moves_by_tangents(first, power, step_s, grid_low, cell, breaks, battery):
     """(entry, piece) offset and rise of tangents above the move, in cells over nodes; move concave in energy."""
     pieces = len(breaks) - 1
@@ -24,7 +24,7 @@ def moves_by_tangents(first, power, step_s, grid_low, cell, breaks, battery):
     return offset, rise
 
 
-@njit(cache=True)
+@compiled()
 def moves_by_cells(
     first, power, step_s, cell, piece_j, edges, voltage, discharge, charging, efficiency
 ):
@@ -47,14 +47,14 @@ def moves_by_cells(
     return offset
 
 
-@njit(cache=True, fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
 def _lower_nodes(best, ahead, cost, share, rise):
     for j in range(len(best)):
         weight = share + rise * j
         best[j] = min(best[j], cost + ahead[j] + weight * (ahead[j + 1] - ahead[j]))
 
 
-@njit(cache=True, fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
 def _raise_defects(defect, best, ahead, cost, share, rise):
     for j in range(len(defect)):
         weight = share + rise * j
@@ -62,7 +62,7 @@ def _raise_defects(defect, best, ahead, cost, share, rise):
         defect[j] = max(defect[j], line - cost - ahead[j + 1])
 
 
-@njit(cache=True)
+@compiled()
 def _run_end(low, high, start, rise, whole):
     """First cell at or after `low` whose move start + rise (cell - low) has left `whole`, at most `high`."""
     if rise <= 0.0:
@@ -70,7 +70,7 @@ def _run_end(low, high, start, rise, whole):
     return min(high, max(low + int(np.ceil((whole + 1 - start) / rise)), low + 1))
 
 
-@njit(cache=True)
+@compiled()
 def lower_backward(
     first, cost, switch_kg, allowed, terminal, breaks, offset, rise, floor_kg, unreachable_kg
 ):

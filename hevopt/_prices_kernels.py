@@ -1,10 +1,11 @@
 """Compiled shortest path over modes; see prices.py."""
 
 import numpy as np
-from numba import njit
+
+from hevopt._compile import compiled
 
 
-@njit(cache=True)
+@compiled()
 def block_minima(first, value):
     """(time, mode) least value of each block and its entry; inf and -1 where the block is empty."""
     steps, modes = first.shape[0], first.shape[1] - 1
@@ -19,7 +20,7 @@ def block_minima(first, value):
     return least, entry
 
 
-@njit(cache=True)
+@compiled()
 def mode_path(least, switch_kg, allowed):
     """Cost-to-go (time + 1, mode) and best next mode (time, mode) of (time, mode) least values."""
     steps, modes = least.shape
@@ -38,7 +39,7 @@ def mode_path(least, switch_kg, allowed):
     return to_go, follow
 
 
-@njit(cache=True)
+@compiled()
 def shortest_path(first, value, switch_kg, allowed, start_mode):
     """Least total of (entry,) values and switching, its (time,) entries, cost-to-go (time + 1, mode)."""
     least, entry = block_minima(first, value)

@@ -1,12 +1,12 @@
 """Compiled parts of the duals with a price per step; the mathematics is in step_prices.py."""
 
 import numpy as np
-from numba import njit
 
 from hevopt._battery_kernels import chemical_power, state_at
+from hevopt._compile import compiled
 
 
-@njit(cache=True)
+@compiled()
 def drain_and_slope(power, energy, battery):
     """Rate at which stored energy falls and its derivative by stored energy, resistance held constant."""
     i = 0
@@ -25,7 +25,7 @@ def drain_and_slope(power, energy, battery):
     return drain, by_voltage * volt_slope / (battery.capacity_as * voltage)
 
 
-@njit(cache=True)
+@compiled()
 def costate(energy, power, step_s, battery):
     """Prices (time,) of x_1 ... x_T that make a rollout stationary, 1 at the end."""
     steps = len(power)
@@ -36,7 +36,7 @@ def costate(energy, power, step_s, battery):
     return price
 
 
-@njit(cache=True)
+@compiled()
 def worth_by_tangents(first, power, step_s, price, rollout, low, high, battery):
     """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex in x."""
     worth = np.empty(len(power))
@@ -65,7 +65,7 @@ def worth_by_tangents(first, power, step_s, price, rollout, low, high, battery):
     return worth
 
 
-@njit(cache=True)
+@compiled()
 def _meeting(x1, y1, s1, x2, y2, s2):
     """Height at which a falling tangent at x1 meets a rising one at x2."""
     if s2 - s1 <= 0.0:
@@ -75,7 +75,7 @@ def _meeting(x1, y1, s1, x2, y2, s2):
     return max(y1 + s1 * (x - x1), y2 + s2 * (x - x2))
 
 
-@njit(cache=True)
+@compiled()
 def worth_by_cells(
     first, power, step_s, price, rollout, edges, voltage, discharge, charging, battery
 ):
@@ -100,7 +100,7 @@ def worth_by_cells(
     return worth
 
 
-@njit(cache=True)
+@compiled()
 def linear_steps(first, power, step_s, energy, rollout_power, battery):
     """Fall of energy of every entry at the rollout, (entry,), and the share of x a step keeps, (time,)."""
     drain = np.empty(len(power))

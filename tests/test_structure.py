@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 
 # From the bottom up; a module may import from its own row or rows above it in this list, never below.
 LAYERS = [
-    ["errors", "units"],
+    ["errors", "units", "_compile"],
     ["files"],
     ["datafile", "cycle"],
     ["_battery_kernels"],
@@ -35,7 +35,7 @@ LAYERS = [
 ]
 STRATEGIES_MAY_SEE = {
     "errors", "problem", "simulation", "choices", "prices", "_prices_kernels", "battery",
-    "_battery_kernels", "strategies",
+    "_battery_kernels", "_compile", "strategies",
 }  # fmt: skip
 
 

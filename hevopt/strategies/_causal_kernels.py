@@ -6,9 +6,9 @@ Choices are those of choices.py. A value function is linear between the nodes of
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hevopt._battery_kernels import chemical_power, state_at
+from hevopt._compile import compiled
 
 # Halvings of the bracket in which a factor over past steps is searched.
 _HALVINGS = 14
@@ -29,7 +29,7 @@ class Feedback(NamedTuple):
     window_reach: float
 
 
-@njit(cache=True)
+@compiled()
 def decide(k, first, cost, power, step_s, switch_kg, allowed, mode, energy, value, low, cell, bat):
     """Entry, mode and stored energy after the choice of least cost + switching + value ahead.
 
@@ -63,7 +63,7 @@ def decide(k, first, cost, power, step_s, switch_kg, allowed, mode, energy, valu
     return entry, next_mode, next_energy
 
 
-@njit(cache=True)
+@compiled()
 def neutral_factor(first, cost, drain, start, end, wanted_j, low, high):
     """The factor between low and high at which steps start <= k < end, each of least cost + factor x drain,
     would have drained `wanted_j` in all; the nearer end where none does."""
@@ -84,7 +84,7 @@ def neutral_factor(first, cost, drain, start, end, wanted_j, low, high):
     return 0.5 * (low + high)
 
 
-@njit(cache=True)
+@compiled()
 def _factor(p, base, shortage, integral, energy, low, high):
     """Equivalence factor for a shortage of charge, and steeper or gone near the window's ends."""
     edge_j = p.edge * (high - low)
@@ -93,7 +93,7 @@ def _factor(p, base, shortage, integral, energy, low, high):
     return max(factor * min(max((high - energy) / edge_j, 0.0), 1.0), 0.0)
 
 
-@njit(cache=True)
+@compiled()
 def adaptive(first, cost, power, drain, step_s, switch_kg, allowed, speed, braking, mode, energy,
              target, low, high, p, bat):  # fmt: skip
     """Entries (time,), factors (time,) and the learnt energy recovered per square of speed.
@@ -137,7 +137,7 @@ def adaptive(first, cost, power, drain, step_s, switch_kg, allowed, speed, braki
     return path, factors, recovered / slowed
 
 
-@njit(cache=True)
+@compiled()
 def improve(first, cost, power, step_s, switch_kg, allowed, row_class, ahead, low, cell, excess_kgpj,
             bat):  # fmt: skip
     """Greedy policy on representative rows for a value ahead (class, mode, node).
@@ -175,7 +175,7 @@ def improve(first, cost, power, step_s, switch_kg, allowed, row_class, ahead, lo
     return own, target, follow
 
 
-@njit(cache=True)
+@compiled()
 def evaluate(own, target, follow, switch_kg, row_class, row_share, stage_kg, ahead, value):
     """Fill the value (class, mode, node) of one step of a policy, `stage_kg` (class, node) included."""
     classes, modes, nodes = ahead.shape
@@ -191,7 +191,7 @@ def evaluate(own, target, follow, switch_kg, row_class, row_share, stage_kg, ahe
                 value[z, m, j] += share * (switch_kg[m, n] + own[r, n, j] + later)
 
 
-@njit(cache=True)
+@compiled()
 def look_ahead(transition, value, ahead):
     """Fill the mean value of the class that follows, (class, mode, node) [now]."""
     classes = len(transition)
@@ -203,7 +203,7 @@ def look_ahead(transition, value, ahead):
                 mean[z] += transition[z, y] * flat[y]
 
 
-@njit(cache=True)
+@compiled()
 def sweep(sweeps, transition, own, target, follow, switch_kg, row_class, row_share, stage_kg,
           value):  # fmt: skip
     """Relative value (class, mode, node) after that many steps of a policy, 0 in the middle of class 0."""
@@ -215,13 +215,13 @@ def sweep(sweeps, transition, own, target, follow, switch_kg, row_class, row_sha
     return value
 
 
-@njit(cache=True, inline="always")
+@compiled(inline="always")
 def _between(values, place):
     j = min(int(place), len(values) - 2)
     return values[j] + (place - j) * (values[j + 1] - values[j])
 
 
-@njit(cache=True)
+@compiled()
 def follow_map(first, cost, power, step_s, switch_kg, allowed, row_class, ahead, mode, energy, low,
                cell, bat):  # fmt: skip
     """Entries (time,) that follow a value ahead (class, mode, node), given the class of each step."""

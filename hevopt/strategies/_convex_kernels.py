@@ -1,10 +1,11 @@
 """Compiled lower convex hulls; see _convex_model.py."""
 
 import numpy as np
-from numba import njit
+
+from hevopt._compile import compiled
 
 
-@njit(cache=True)
+@compiled()
 def lower_hulls(first, cost, power):
     """Entries on the lower convex hull of cost over power, block by block, and their new block starts.
 

@@ -1,13 +1,13 @@
 """Compiled parts of receding-horizon control: hulls, fits, the neutral price of what was seen, the choice."""
 
 import numpy as np
-from numba import njit
 
 from hevopt._battery_kernels import chemical_power, state_at
+from hevopt._compile import compiled
 from hevopt._prices_kernels import shortest_path
 
 
-@njit(cache=True)
+@compiled()
 def drains(first, power, step_s, energy, battery):
     """(entry,) fall of stored energy of every choice at one stored energy."""
     result = np.empty(len(power))
@@ -20,7 +20,7 @@ def drains(first, power, step_s, energy, battery):
     return result
 
 
-@njit(cache=True)
+@compiled()
 def falling_hull(first, cost, drain):
     """Lower convex hull of each block's cost over drained energy, where cost falls: its entries and their starts.
 
@@ -54,7 +54,7 @@ def falling_hull(first, cost, drain):
     return hull[:top], starts
 
 
-@njit(cache=True)
+@compiled()
 def _parabola(x, y):
     """Curvature (>= 0) and slope at 0 of the least-squares parabola through points; a line where there are two."""
     centre = np.mean(x)
@@ -72,7 +72,7 @@ def _parabola(x, y):
     return curvature, slope - curvature * centre
 
 
-@njit(cache=True)
+@compiled()
 def fits(first, cost, drain, hull, starts):
     """(time, mode, 5) of each block: least drain, drain of least cost, greatest drain, curvature and slope at 0
     of a convex parabola through the hull of cost over drain; 0 where the block is empty.
@@ -90,7 +90,7 @@ def fits(first, cost, drain, hull, starts):
     return result
 
 
-@njit(cache=True)
+@compiled()
 def neutral_prices(hull, starts, cost, drain, seen, least_price):
     """(time,) price at which the steps seen by then, 0 to seen[k] - 1, would have drained nothing in all.
 
@@ -116,7 +116,7 @@ def neutral_prices(hull, starts, cost, drain, seen, least_price):
     return result
 
 
-@njit(cache=True)
+@compiled()
 def _merge(slope, width, edges, drain, cost):
     """Put the edges of one hull among the first `edges` of slope and width, steepest first; their new number."""
     new = len(drain) - 1
@@ -132,7 +132,7 @@ def _merge(slope, width, edges, drain, cost):
     return edges + new
 
 
-@njit(cache=True)
+@compiled()
 def best_mode_path(
     first, cost, drain, switch_kg, allowed, start_mode, prices, price, gain, charge, unit
 ):
@@ -154,7 +154,7 @@ def best_mode_path(
     return least_total, best
 
 
-@njit(cache=True)
+@compiled()
 def reachable_band(start, least_drain, greatest_drain, low, high):
     """Bounds (step,) on energy: the window, opened just as far as the drains on hand cannot keep it."""
     steps = len(least_drain)
@@ -167,7 +167,7 @@ def reachable_band(start, least_drain, greatest_drain, low, high):
     return bottom, top
 
 
-@njit(cache=True)
+@compiled()
 def nearest_choice(choices, k, mode, modes, energy, band, slack, price, curvature, target, battery):
     """Entry of least  cost + switching + price drain + curvature/2 (drain - target)²  among some modes.
 

@@ -1,15 +1,15 @@
 """Compiled reachability, backward recursion and rollout, all on stored energy with the true battery step."""
 
 import numpy as np
-from numba import njit
 
 from hevopt._battery_kernels import chemical_power, chemical_power_at, state_at
+from hevopt._compile import compiled
 
 # Divisions of the grid between which a move over curved battery characteristics is taken as linear.
 _PIECES = 24
 
 
-@njit(cache=True)
+@compiled()
 def _energy_before(after, power, step, low, high, battery):
     """Stored energy within [low, high] from which a step leads to `after`; clipped to the window."""
     energy = min(max(after, low), high)
@@ -22,7 +22,7 @@ def _energy_before(after, power, step, low, high, battery):
     return energy
 
 
-@njit(cache=True)
+@compiled()
 def reachable(first, power, step_s, allowed, low, high, end_min, battery):
     """Least and greatest stored energy (time + 1, mode) from which the end can still be reached.
 
@@ -55,7 +55,7 @@ def reachable(first, power, step_s, allowed, low, high, end_min, battery):
     return least, greatest
 
 
-@njit(cache=True)
+@compiled()
 def rollout(first, cost, power, step_s, switch_kg, allowed, start_mode, start, value, grid_low,
             cell, least, greatest, battery, budget):  # fmt: skip
     """Entries (time,) of the path that follows a value function, and the steps it reached.
@@ -111,7 +111,7 @@ def rollout(first, cost, power, step_s, switch_kg, allowed, start_mode, start, v
     return path, k, furthest, moves
 
 
-@njit(cache=True, fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
 def _relax(best, value, cost, low, high, cells, share, share_slope):
     """best[j] = min(best[j], cost + value at node j + cells + share_j) for low <= j < high."""
     ahead = value[low + cells : high + cells + 1]
@@ -122,7 +122,7 @@ def _relax(best, value, cost, low, high, cells, share, share_slope):
         here[j] = min(here[j], candidate)
 
 
-@njit(cache=True)
+@compiled()
 def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
     """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away.
 
@@ -154,7 +154,7 @@ def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
         j = run
 
 
-@njit(cache=True)
+@compiled()
 def _bends(grid_low, cell, nodes, battery):
     """Nodes between which a move is taken as linear, and voltage and resistances there.
 
@@ -171,7 +171,7 @@ def _bends(grid_low, cell, nodes, battery):
     return breaks, states
 
 
-@njit(cache=True)
+@compiled()
 def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low, cell, floor_kg,
              ceiling_kg, unreachable_kg, battery):  # fmt: skip
     """Cost-to-go (time + 1, mode, node) by value iteration over stored energy grid_low[k] + cell x node.

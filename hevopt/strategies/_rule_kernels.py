@@ -1,12 +1,12 @@
 """Compiled parts of the rule-based strategies."""
 
 import numpy as np
-from numba import njit
 
 from hevopt._battery_kernels import chemical_power_at
+from hevopt._compile import compiled
 
 
-@njit(cache=True)
+@compiled()
 def load_point_choices(first, cost, power, nox, fired, charge_w, nox_cap_kgps, step_s):
     """(level, time) entry of least cost among fired ones that charge at least charge_w[level] within the cap.
 
@@ -39,7 +39,7 @@ def load_point_choices(first, cost, power, nox, fired, charge_w, nox_cap_kgps, s
     return chosen
 
 
-@njit(cache=True)
+@compiled()
 def drive(wanted, fallback, power, step_s, start_j, least_j, battery):
     """Entries (time,) that take `wanted` while more than least_j is stored and else `fallback`, and the energy.
 
