@@ -138,7 +138,8 @@ def best_torque_nm(engine: Engine, speed_radps: Array) -> Array:
 
 
 def _piston_speed_mps(engine: Engine, speed_radps: Array) -> Array:
-    return engine.stroke_m * speed_radps / pi
+    # Beyond its highest speed an engine is not used, and the polynomial means nothing there.
+    return engine.stroke_m * np.minimum(speed_radps, engine.speed_max_radps) / pi
 
 
 def _mean_pressure_bar(engine: Engine, torque_nm: Array) -> Array:

@@ -49,6 +49,13 @@ def test_lowest_engine_speed_and_cost_of_a_change_are_kept(name):
     assert trajectory.switch_fuel_kg.sum() == pytest.approx(expected, rel=1e-9)
 
 
+def test_first_gear_at_120_kmh_is_rejected_without_a_warning():
+    table = build_problem(free("D"), load_cycle("nedc")).table
+    k = int(np.argmax(table.signals.speed_mps))
+    first = [i for i, c in enumerate(table.controls) if c.engine_on and c.engine_gear == 1]
+    assert (table.reject[k, first] != 0).all()
+
+
 @pytest.mark.parametrize("name", ["C1", "D"])
 def test_every_strategy_and_the_certificate_take_a_free_gear(name):
     problem = build_problem(free(name), load_cycle("nedc"))
