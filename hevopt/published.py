@@ -45,7 +45,7 @@ def published_beside(comparison: Comparison) -> list[Published]:
     mean_nox = None if None in hybrids else sum(hybrids) / len(hybrids)
     litres, mg = "fuel_l_per_100km", "nox_mg_per_km"
     engaged = "ours keeps the engine on for the 5 s of every K phase; dp shows their worth"
-    upper = "our rules are calibrated to least fuel and drive electrically to several kW"
+    upper = "our threshold is calibrated to least fuel: see the curve of hevopt run --strategy conventional"
     peaks = "load-point shift moves our engine to loads of higher BSNOx (OM611 map)"
     severe = "ours takes the family's least NOx, whatever it costs in fuel"
     rows_of = [
