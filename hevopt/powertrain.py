@@ -23,18 +23,16 @@ from hevopt.cycle import Cycle
 from hevopt.demand import Demand, demand_of
 from hevopt.driver import change_down
 from hevopt.errors import DataError, InfeasibleError
-from hevopt.problem import REJECT_WORDS, Control, ControlTable, Problem, Reject, Signals
+from hevopt.problem import Control, ControlTable, Problem, Reject, Signals
+from hevopt.rejects import bits, function_rejects, limit_rejects
+from hevopt.shortfall import shortfall_message
 from hevopt.transmission import output_torque_nm
 
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint16]
 
 TORQUE_LEVELS = 41
-_TORQUE_TOLERANCE_NM = 1e-6
-_POWER_TOLERANCE_W = 1e-6
 _ROUNDING_W = 1e-9
-_BOOST_SLACK_NM = 1e-3
-_SHORTFALLS_LISTED = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +97,7 @@ def build_table(
         if stuck.any():
             missing = np.zeros_like(missing) if allow_shortfall else missing
             raise InfeasibleError(
-                _shortfall_message(architecture, demand, stuck, missing, branches)
+                shortfall_message(architecture, demand, stuck, missing, _rejects(branches))
             )
     return _assemble(architecture, demand, branches, missing)
 
@@ -115,6 +113,10 @@ def _branches(architecture: Architecture, demand: Demand, levels: int) -> list[_
             branch.reject[~spread, 1:] |= np.uint16(Reject.DUPLICATE)
             branches.append(branch)
     return branches
+
+
+def _rejects(branches: list[_Branch]) -> Bits:
+    return np.hstack([branch.reject for branch in branches])
 
 
 def _stuck(branches: list[_Branch]) -> NDArray[np.bool_]:
@@ -142,13 +144,13 @@ def _branch(
     # What an alternator that follows its load leaves to the battery is rounding, not charge.
     battery_power_w = np.where(np.abs(battery_power_w) < _ROUNDING_W, 0.0, battery_power_w)
     reject = (
-        _bits(Reject.ENGINE_MAP, off_map)
-        | _limit_rejects(architecture, demand, joint, torques)
-        | _bits(
+        bits(Reject.ENGINE_MAP, off_map)
+        | limit_rejects(architecture, demand, joint, torques)
+        | bits(
             Reject.BATTERY_LIMIT,
             ~battery_model.within_limits(architecture.battery, battery_power_w),
         )
-        | _function_rejects(architecture, demand, joint, torques, battery_power_w)
+        | function_rejects(architecture, demand, joint, torques, battery_power_w)
     )
     return _Branch(
         joint, labels, fuel_kgps * step_s, nox_kgps * step_s, battery_power_w, reject, flows
@@ -200,69 +202,6 @@ def _gear_loss_w(input_w: Array, efficiency: Array) -> Array:
     return np.where(input_w > 0, input_w * (1 - efficiency), input_w * (1 - 1 / efficiency))
 
 
-def _limit_rejects(
-    architecture: Architecture, demand: Demand, joint: Joint, torques: Balance
-) -> Bits:
-    """Limits of engine, machine and shafts, whatever the architecture may do."""
-    tolerance = _TORQUE_TOLERANCE_NM
-    engine, machine = architecture.engine, architecture.machine
-    engine_speed, speed = joint.engine_speed_radps[:, None], joint.machine_speed_radps[:, None]
-    full = engine_model.full_load_torque_nm(engine, engine_speed) if joint.engine_on else 0.0
-    limit = machine_model.torque_limit_nm(machine, speed)
-    torque = np.abs(torques.machine)
-    wanted = demand.wheel_torque_nm[:, None]
-    unmet = np.where(wanted > 0, np.abs(torques.brake), -torques.brake) > 10 * tolerance
-    return (
-        _bits(Reject.ENGINE_TORQUE, torques.engine > full + tolerance)
-        | _bits(Reject.ENGINE_TORQUE, torques.engine < torques.least_engine - tolerance)
-        | _bits(Reject.ENGINE_SPEED, engine_speed > engine.speed_max_radps * (1 + 1e-12))
-        | _bits(Reject.MACHINE_LIMIT, torque > limit + tolerance)
-        | _bits(Reject.MACHINE_SPEED, joint.connected[:, None] & (speed > machine.speed_max_radps))
-        | _bits(Reject.NO_PATH, ~joint.connected[:, None] & (torque > tolerance))
-        | _bits(Reject.NO_PATH, joint.slipping[:, None] & (torques.clutch < -tolerance))
-        | _bits(Reject.NO_PATH, ~joint.possible[:, None] | unmet)
-    )
-
-
-def _function_rejects(
-    architecture: Architecture,
-    demand: Demand,
-    joint: Joint,
-    torques: Balance,
-    battery_power_w: Array,
-) -> Bits:
-    """Table 1: what the architecture's functions leave of the physically possible.
-
-    start_stop            engine at rest while the car stands
-    power_management      engine at rest, or dragged, while the machine drives; assistance
-    nox_cut               assistance by the machine while the engine drives
-    e_boost               assistance only beyond the engine's full load
-    regenerative_braking  charging while the car is braked
-    Charging by the engine while it runs needs no function: any alternator does that.
-    """
-    has = architecture.functions.__contains__
-    wanted = demand.wheel_torque_nm[:, None]
-    standing = demand.wheel_speed_radps[:, None] == 0
-    banned = np.zeros(torques.machine.shape, dtype=bool)
-    if not joint.engine_on:
-        banned |= standing & (not has("start_stop"))
-        banned |= ~standing & (not has("power_management"))
-    elif not has("power_management"):
-        motoring = torques.machine > _TORQUE_TOLERANCE_NM
-        banned |= motoring & (torques.engine <= 0)
-        if not has("nox_cut"):
-            speed = joint.engine_speed_radps[:, None]
-            full = engine_model.full_load_torque_nm(architecture.engine, speed)
-            banned |= motoring & ~(has("e_boost") & (torques.engine > full - _BOOST_SLACK_NM))
-    if not has("regenerative_braking"):
-        banned |= (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)
-    return _bits(Reject.FUNCTION, banned)
-
-
-def _bits(reason: Reject, where: Array) -> Bits:
-    return np.where(where, np.uint16(reason), np.uint16(0))
-
-
 def _assemble(
     architecture: Architecture, demand: Demand, branches: list[_Branch], missing: Array
 ) -> ControlTable:
@@ -283,7 +222,7 @@ def _assemble(
         fuel_kg=np.hstack([branch.fuel_kg for branch in branches]),
         nox_kg=np.hstack([branch.nox_kg for branch in branches]),
         battery_power_w=np.hstack([branch.battery_power_w for branch in branches]),
-        reject=np.hstack([branch.reject for branch in branches]),
+        reject=_rejects(branches),
         mode=np.repeat(modes, widths),
         switch_fuel_kg=switch_fuel_kg,
         switch_allowed=np.ones(switch_fuel_kg.shape, dtype=bool),
@@ -327,57 +266,3 @@ def _modes(architecture: Architecture, branches: list[_Branch]) -> tuple[NDArray
                 + (engine_kg if changed else 0.0)
             )
     return np.array([distinct.index(key) for key in keys]), switch
-
-
-def _shortfall_message(
-    architecture: Architecture,
-    demand: Demand,
-    stuck: NDArray[np.bool_],
-    missing: Array,
-    branches: list[_Branch],
-) -> str:
-    reject = np.hstack([branch.reject for branch in branches])
-    steps = np.flatnonzero(stuck)
-    lines = []
-    for k in steps[:_SHORTFALLS_LISTED]:
-        counts = {word: int(np.sum(reject[k] & bit > 0)) for bit, word in REJECT_WORDS.items()}
-        reasons = ", ".join(f"{word} {count}" for word, count in counts.items() if count)
-        torque = f", {missing[k]:.0f} Nm missing at the wheels" if missing[k] > 0 else ""
-        lines.append(
-            f"t = {demand.time_s[k]:g} s: {demand.speed_mps[k] * 3.6:.1f} km/h, gear "
-            f"{demand.gear[k]}, {demand.wheel_power_w[k] / 1e3:.1f} kW at the wheels"
-            f"{torque} (of {reject.shape[1]} controls rejected: {reasons})"
-        )
-    more = len(steps) - len(lines)
-    lines += [f"and {more} more"] if more else []
-    return (
-        f"architecture {architecture.name} cannot follow the cycle at {len(steps)} of "
-        f"{len(stuck)} steps:\n  "
-        + "\n  ".join(lines + _shortfall_advice(demand, stuck, missing, reject))
-    )
-
-
-def _shortfall_advice(
-    demand: Demand, stuck: NDArray[np.bool_], missing: Array, reject: Bits
-) -> list[str]:
-    """What to do, by what is wrong: the cycle's gear, too little torque, or a limit."""
-    neutral = stuck & (demand.gear == 0) & (demand.wheel_torque_nm > 0)
-    weak, limited = stuck & ~neutral & (missing > 0), stuck & ~neutral & (missing == 0)
-    advice = []
-    if neutral.any():
-        advice.append(
-            "correct the cycle's gear column: in gear 0 the engine cannot drive the wheels"
-        )
-    if weak.any():
-        advice.append(
-            "choose an easier cycle, a stronger engine (full_load in its file) or lower gears, or pass "
-            "--allow-shortfall to drive on with what there is"
-        )
-    if limited.any():
-        counts = {w: int(np.sum(reject[limited] & bit > 0)) for bit, w in REJECT_WORDS.items()}
-        del counts[REJECT_WORDS[Reject.DUPLICATE]]
-        advice.append(
-            f"where no torque is missing, most controls are rejected for: {max(counts, key=counts.get)}; "
-            "widen that limit in its component's file, or choose an easier cycle"
-        )
-    return advice
