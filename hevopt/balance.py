@@ -6,6 +6,7 @@ With S the machine's torque less its inertia, and M what S gives at the wheels o
 With negative demand T_e stops at the drag torque and the brakes take what the shafts do not.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 
 _BRAKING_LEVELS = 6
 _TORQUE_TOLERANCE_NM = 1e-6
+_ADDED_PLACES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 _SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency", "fuel cut")
 
 
@@ -44,8 +46,32 @@ class Balance:
     least_engine: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Around:
+    """Where to add machine torques: close to those of a plan.
+
+    torque_nm: (engine on, machine gear, engine gear) -> (time,) torque of the plan, NaN where it drives another way
+    share: distance of the outermost torque added, as a share of what is open at the step
+    """
+
+    torque_nm: Mapping[tuple[bool, int, int], Array]
+    share: float
+
+    def added_nm(self, joint: Joint, low: Array, high: Array) -> Array:
+        """(time, added) machine torques; the lowest open one again where the plan drives another way."""
+        key = (joint.engine_on, joint.machine_gear, joint.engine_gear)
+        centre = self.torque_nm.get(key, np.full_like(low, np.nan))[:, None]
+        added = centre + self.share * (high - low)[:, None] * _ADDED_PLACES
+        low, high = np.minimum(low, high)[:, None], np.maximum(low, high)[:, None]
+        return np.where(np.isnan(added), low, np.clip(added, low, high))
+
+
 def machine_torques(
-    architecture: Architecture, demand: Demand, joint: Joint, levels: int
+    architecture: Architecture,
+    demand: Demand,
+    joint: Joint,
+    levels: int,
+    around: Around | None = None,
 ) -> tuple[Array, tuple[str, ...], NDArray[np.bool_]]:
     """(time, level) machine torques, their labels, and (time,) whether there is any choice."""
     idle = machine_model.generating_torque_nm(
@@ -67,7 +93,11 @@ def machine_torques(
     cut = machine_torque_at(architecture, demand, joint, least)
     cut = np.clip(cut, np.minimum(low, high), np.maximum(low, high))
     torque = np.column_stack([torque, np.zeros_like(idle), idle, best, cut])
-    return torque, (*labels, *_SPECIAL_LEVELS), spread
+    labels = (*labels, *_SPECIAL_LEVELS)
+    if around is not None:
+        torque = np.column_stack([torque, around.added_nm(joint, low, high)])
+        labels = (*labels, *(f"refined {place:+.2f}" for place in _ADDED_PLACES))
+    return torque, labels, spread
 
 
 def machine_torque_range(

@@ -46,6 +46,10 @@ ShortfallOption = Annotated[
 GearOption = Annotated[
     bool, typer.Option("--free-gear", help="The engine's gear is a control, not the cycle's.")
 ]
+RefineOption = Annotated[
+    bool,
+    typer.Option("--refine", help="Add torque levels around dp's plan until its cost settles."),
+]
 HorizonOption = Annotated[
     float | None,
     typer.Option("--horizon", help="Preview of the predictive strategies, s (default 20)."),
@@ -76,6 +80,7 @@ def compare(
     nox_weight: NoxOption = 0.0,
     allow_shortfall: ShortfallOption = False,
     free_gear: GearOption = False,
+    refine: RefineOption = False,
     horizon: HorizonOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -90,6 +95,7 @@ def compare(
             nox_weight=nox_weight,
             allow_shortfall=allow_shortfall,
             free_gear=free_gear,
+            refine=refine,
             horizon_s=horizon,
             progress=progress,
         )
@@ -119,6 +125,7 @@ def run(
     nox_weight: NoxOption = 0.0,
     allow_shortfall: ShortfallOption = False,
     free_gear: GearOption = False,
+    refine: RefineOption = False,
     horizon: HorizonOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -135,7 +142,13 @@ def run(
         _check_out(out, architecture, cycle)
     with _Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
-        case = study.prepare(car, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
+        case = study.prepare(
+            car,
+            trace,
+            nox_weight=nox_weight,
+            allow_shortfall=allow_shortfall,
+            refine=refine,
+        )
         progress(f"{car.name}: {strategy}", 0, 1)
         row, plan, trajectory = study.run_case(case, strategy, horizon)
     comparison = study.Comparison(trace.name, [row], {}, nox_weight, "nothing, a single run")

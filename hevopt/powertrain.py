@@ -17,13 +17,13 @@ from hevopt import battery as battery_model
 from hevopt import engine as engine_model
 from hevopt import machine as machine_model
 from hevopt.architecture import Architecture
-from hevopt.balance import Balance, balance, deliverable_nm, machine_torques
+from hevopt.balance import Around, Balance, balance, deliverable_nm, machine_torques
 from hevopt.couplings import Joint, joints
 from hevopt.cycle import Cycle
 from hevopt.demand import Demand, demand_of
 from hevopt.driver import change_down
 from hevopt.errors import DataError, InfeasibleError
-from hevopt.problem import Control, ControlTable, Problem, Reject, Signals
+from hevopt.problem import Control, ControlTable, Problem, Reject, Signals, Trajectory
 from hevopt.rejects import bits, function_rejects, limit_rejects
 from hevopt.shortfall import shortfall_message
 from hevopt.transmission import output_torque_nm
@@ -56,10 +56,12 @@ def build_problem(
     nox_weight: float = 0.0,
     soc_start: float | None = None,
     allow_shortfall: bool = False,
+    around: Around | None = None,
 ) -> Problem:
     """The energy-management problem of a car on a cycle, charge at the end no less than at the start.
 
-    levels: machine torques per step and joint; nox_weight: kg of fuel that a kg of NOx counts.
+    levels: machine torques per step and joint; nox_weight: kg of fuel that a kg of NOx counts;
+    around: where to add torques with the engine on, see `torques_of`.
     Raises InfeasibleError, listing steps and missing torque, where no control follows the cycle; with
     `allow_shortfall` such steps are driven with what the powertrain can give, and marked in the table.
     """
@@ -68,7 +70,9 @@ def build_problem(
         demand = change_down(
             demand, architecture.vehicle, architecture.engine, architecture.gearbox
         )
-    table = build_table(architecture, demand, levels=levels, allow_shortfall=allow_shortfall)
+    table = build_table(
+        architecture, demand, levels=levels, allow_shortfall=allow_shortfall, around=around
+    )
     start = architecture.soc_start if soc_start is None else soc_start
     return Problem(table, architecture.battery, start, start, 0, nox_weight)
 
@@ -79,11 +83,12 @@ def build_table(
     *,
     levels: int = TORQUE_LEVELS,
     allow_shortfall: bool = False,
+    around: Around | None = None,
 ) -> ControlTable:
     """Every control at every step, (time, control)."""
     if not 2 <= levels <= 2001:
         raise DataError(f"torque levels {levels}; allowed: 2 to 2001")
-    branches = _branches(architecture, demand, levels)
+    branches = _branches(architecture, demand, levels, around)
     stuck = _stuck(branches)
     missing = np.zeros(len(demand.time_s))
     if stuck.any():
@@ -92,7 +97,7 @@ def build_table(
         missing = np.where(stuck, np.maximum(short, 0.0), 0.0)
         if allow_shortfall:
             demand = demand.with_torque(demand.wheel_torque_nm - missing)
-            branches = _branches(architecture, demand, levels)
+            branches = _branches(architecture, demand, levels, around)
             stuck = _stuck(branches)
         if stuck.any():
             missing = np.zeros_like(missing) if allow_shortfall else missing
@@ -102,12 +107,27 @@ def build_table(
     return _assemble(architecture, demand, branches, missing)
 
 
-def _branches(architecture: Architecture, demand: Demand, levels: int) -> list[_Branch]:
+def torques_of(trajectory: Trajectory, table: ControlTable) -> dict[tuple[bool, int, int], Array]:
+    """(engine on, machine gear, engine gear) -> (time,) machine torque of a trajectory, NaN elsewhere."""
+    ways = [
+        (label.engine_on, label.machine_gear, label.engine_gear)
+        for label in (table.controls[c] for c in trajectory.control)
+    ]
+    torque = trajectory.flows["machine_torque_nm"]
+    return {
+        way: np.where([other == way for other in ways], torque, np.nan)
+        for way in dict.fromkeys(ways)
+    }
+
+
+def _branches(
+    architecture: Architecture, demand: Demand, levels: int, around: Around | None
+) -> list[_Branch]:
     branches = []
     may_stop = architecture.functions & {"start_stop", "power_management"}
     for joint in joints(architecture, demand):
         if joint.engine_on or may_stop:
-            torque, labels, spread = machine_torques(architecture, demand, joint, levels)
+            torque, labels, spread = machine_torques(architecture, demand, joint, levels, around)
             torques = balance(architecture, demand, joint, torque)
             branch = _branch(architecture, demand, joint, torques, labels)
             branch.reject[~spread, 1:] |= np.uint16(Reject.DUPLICATE)
