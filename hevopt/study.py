@@ -316,7 +316,8 @@ def _status(problem: Problem, gained_j: float, fuel_j: float) -> str:
         marks.append("not neutral")
     missing = problem.table.missing_torque_nm
     if missing is not None and (missing > 0).any():
-        marks.append(f"shortfall at {int((missing > 0).sum())} steps")
+        count = int((missing > 0).sum())
+        marks.append(f"shortfall at {count} step{'s' if count > 1 else ''}")
     return ", ".join(marks) or "ok"
 
 

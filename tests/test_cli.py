@@ -73,7 +73,7 @@ def test_a_cycle_the_car_cannot_follow_ends_with_3_unless_shortfall_is_allowed(m
     status, out, err = call(monkeypatch, capsys, *words)
     assert status == 3 and "Nm missing" in err and "t = 299 s" in err and "failed" in out
     status, out, _ = call(monkeypatch, capsys, *words, "--allow-shortfall")
-    assert status == 0 and "shortfall at 1 steps" in out
+    assert status == 0 and "shortfall at 1 step" in out
 
 
 def test_names_and_paths_work_from_any_directory(monkeypatch, capsys, tmp_path):

@@ -1,5 +1,6 @@
 """Everything the README tells a reader to run is run, and what it shows is what is printed."""
 
+import importlib.util
 import re
 import shlex
 import subprocess
@@ -60,3 +61,30 @@ def test_the_table_shown_is_the_table_printed(comparison_of):
         words = shown[row.architecture, row.strategy]
         assert float(words[0]) == pytest.approx(row.fuel_l_per_100km, abs=2e-3)
         assert float(words[9]) == pytest.approx(row.bound_l_per_100km, abs=2e-3)
+
+
+def test_the_page_of_strategies_is_made(monkeypatch, tmp_path, capsys):
+    # One cycle here; the page in reports/ is made over all of them, in about a minute.
+    monkeypatch.setattr("hevopt.files.shipped_names", lambda kind, suffix: ["hwfet"])
+    page = tmp_path / "strategies.md"
+    monkeypatch.setattr("sys.argv", ["hevopt", "strategies", "--out", str(page)])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert not stop.value.code, capsys.readouterr().err
+    text, committed = page.read_text(), (ROOT / "reports" / "strategies.md").read_text()
+    for name in ("conventional", "dp", "convex", "mpc", "a_ecms", "sdp"):
+        assert f"| `{name}` |" in text and f"| `{name}` |" in committed
+    assert "## C2, gap %" in text and "hwfet" in text
+
+
+def test_benchmarks_measure_the_kernel_and_name_every_figure():
+    path = ROOT / "tests" / "benchmarks" / "run.py"
+    spec = importlib.util.spec_from_file_location("benchmarks", path)
+    benchmarks = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmarks)
+    problem = benchmarks.foreign_problem()
+    call, count = benchmarks.backward_call(problem, 101)
+    assert call().shape == (1401, 1, 101) and count > 1e6
+    committed = (ROOT / "reports" / "benchmarks.md").read_text()
+    for figure in ("dp kernel", "ratio", "first time", "--help", "lower-bound DP", "nodes 201"):
+        assert figure in committed
