@@ -37,6 +37,10 @@ class Choices(NamedTuple):
         """Number of steps."""
         return len(self.step_s)
 
+    def spread(self, per_step: NDArray) -> NDArray:
+        """(entry,) a value per step, repeated for each of the step's entries."""
+        return np.repeat(per_step, self.first[:, -1] - self.first[:, 0])
+
     @property
     def modes(self) -> int:
         """Number of modes."""

@@ -51,13 +51,20 @@ def least_drain_j(problem: Problem, choices: Choices) -> Array:
         drain_w[part] = battery_model.chemical_power_w(
             problem.battery, choices.power_w[part], voltage, resistance
         )
-    return drain_w * step_of_entry(choices)
+    return drain_w * choices.spread(choices.step_s)
 
 
-def step_of_entry(choices: Choices) -> Array:
-    """(entry,) length of the step an entry belongs to."""
-    counts = choices.first[:, -1] - choices.first[:, 0]
-    return np.repeat(choices.step_s, counts)
+def drain_at_j(problem: Problem, choices: Choices, energy_j: float | Array) -> Array:
+    """(entry,) fall of stored energy at one stored energy, or at one per step, (time,)."""
+    pack = problem.battery
+    soc = battery_model.soc(pack, np.broadcast_to(energy_j, choices.steps))
+    voltage, discharge, charge = (
+        choices.spread(np.interp(soc, pack.soc, curve))
+        for curve in (pack.open_circuit_v, pack.discharge_ohm, pack.charge_ohm)
+    )
+    resistance = np.where(choices.power_w < 0, charge, discharge)
+    drain_w = battery_model.chemical_power_w(pack, choices.power_w, voltage, resistance)
+    return drain_w * choices.spread(choices.step_s)
 
 
 def one_price_dual(problem: Problem) -> list[Line]:

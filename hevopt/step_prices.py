@@ -68,7 +68,7 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     from scipy.sparse import csr_array
 
     choices = without_dominated(choices_of(problem))
-    step = np.repeat(np.arange(choices.steps), choices.first[:, -1] - choices.first[:, 0])
+    step = choices.spread(np.arange(choices.steps))
     drain_j, keep_j = kernels.linear_steps(
         choices.first, choices.power_w, choices.step_s, rollout.energy_j, rollout.battery_power_w,
         problem.battery.arrays,

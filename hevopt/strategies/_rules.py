@@ -67,7 +67,7 @@ def rules_of(problem: Problem) -> Rules:
         raise DataError("rule-based strategies need a table with signals (speed, power, gear)")
     choices = choices_of(problem)
     engine_on = np.array([control.engine_on for control in table.controls])
-    step = np.repeat(np.arange(choices.steps), choices.first[:, -1] - choices.first[:, 0])
+    step = choices.spread(np.arange(choices.steps))
     fuel = table.fuel_kg[step, choices.control]
     on = engine_on[choices.control]
     signals = table.signals
@@ -144,7 +144,7 @@ def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan
 
 def _engine_entries(rules: Rules, nox_cap_kgps: float) -> NDArray[np.int64]:
     choices = rules.choices
-    steps = np.repeat(np.arange(choices.steps), choices.first[:, -1] - choices.first[:, 0])
+    steps = choices.spread(np.arange(choices.steps))
     nox = rules.problem.table.nox_kg[steps, choices.control]
     shifted = kernels.load_point_choices(
         choices.first, choices.cost_kg, choices.power_w, nox, rules.fired, rules.charge_w,
@@ -206,9 +206,8 @@ def _next_true(flags: NDArray[np.bool_], standing: NDArray[np.bool_]) -> NDArray
 def _least(choices: Choices, figure: Array, allowed: NDArray[np.bool_]) -> Entries:
     """(time,) entry of least figure among the allowed ones, -1 where there is none."""
     masked = np.where(allowed, figure, np.inf)
-    starts = choices.first[:, 0]
     least = _step_minimum(choices, masked)
-    step = np.repeat(np.arange(choices.steps), choices.first[:, -1] - starts)
+    step = choices.spread(np.arange(choices.steps))
     hits = np.flatnonzero((masked == least[step]) & np.isfinite(masked))
     entry = np.full(choices.steps, -1, dtype=np.int64)
     entry[step[hits][::-1]] = hits[::-1]

@@ -31,10 +31,9 @@ the mean gap is 1.8 %, more than without, so it is off by default.
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt import battery as battery_model
-from hevopt.choices import Choices, choices_of
+from hevopt.choices import choices_of
 from hevopt.errors import DataError
-from hevopt.prices import step_of_entry
+from hevopt.prices import drain_at_j
 from hevopt.problem import Plan, Problem
 from hevopt.strategies import _causal_kernels as kernels
 
@@ -66,7 +65,7 @@ def solve(
     choices = choices_of(problem)
     low, high = problem.window_j
     path, factor, recovered = kernels.adaptive(
-        choices.first, choices.cost_kg, choices.power_w, _drain_at_start_j(problem, choices),
+        choices.first, choices.cost_kg, choices.power_w, drain_at_j(problem, choices, problem.start_j),
         choices.step_s, choices.switch_kg, choices.switch_allowed, *_speed_and_braking(problem),
         problem.start_mode, problem.start_j, problem.end_min_j, low, high, settings,
         problem.battery.arrays,
@@ -87,15 +86,3 @@ def _speed_and_braking(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
         steps = len(problem.table.step_s)
         return np.zeros(steps), np.zeros(steps, dtype=bool)
     return signals.speed_mps, signals.wheel_power_w < 0
-
-
-def _drain_at_start_j(problem: Problem, choices: Choices) -> Array:
-    """(entry,) fall of stored energy at the start's state of charge."""
-    soc, pack = problem.soc_start, problem.battery
-    voltage, discharge, charge = (
-        np.interp(soc, pack.soc, curve)
-        for curve in (pack.open_circuit_v, pack.discharge_ohm, pack.charge_ohm)
-    )
-    resistance = np.where(choices.power_w < 0, charge, discharge)
-    rate_w = battery_model.chemical_power_w(pack, choices.power_w, voltage, resistance)
-    return rate_w * step_of_entry(choices)

@@ -21,11 +21,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt import battery as battery_model
 from hevopt._prices_kernels import shortest_path
 from hevopt.choices import Choices, choices_of
 from hevopt.errors import InfeasibleError
-from hevopt.prices import dual, one_price_dual, step_of_entry
+from hevopt.prices import drain_at_j, dual, one_price_dual
 from hevopt.problem import Plan, Problem
 from hevopt.simulation import total_cost_kg
 from hevopt.strategies._convex_model import SOLVER, Solution, optimum
@@ -123,10 +122,10 @@ def _mode_path(
 
     Of the paths on both sides of the dual's top, the one whose energy departs less from the trajectory's.
     """
-    counts = choices.first[:, -1] - choices.first[:, 0]
-    drain_j = _drain_j(problem, choices, solution.energy_j)
-    excess_j = drain_j + np.repeat(np.diff(solution.energy_j), counts)
-    worth = np.repeat(solution.price_kgpj, counts) * excess_j
+    energy_j = np.clip(solution.energy_j[:-1], *problem.window_j)
+    drain_j = drain_at_j(problem, choices, energy_j)
+    excess_j = drain_j + choices.spread(np.diff(solution.energy_j))
+    worth = choices.spread(solution.price_kgpj) * excess_j
     try:
         top = dual(problem, choices, worth, 0.0, float(solution.price_kgpj[-1]))[-1].scale
     except InfeasibleError:
@@ -140,17 +139,3 @@ def _mode_path(
         found.append((abs(float(np.sum(worth[path]))), scale, path, to_go))
     _, scale, path, to_go = min(found, key=lambda item: item[:2])
     return problem.table.mode[choices.control[path]], scale * solution.price_kgpj, to_go
-
-
-def _drain_j(problem: Problem, choices: Choices, energy_j: Array) -> Array:
-    """(entry,) fall of stored energy at a trajectory's state of charge."""
-    pack = problem.battery
-    counts = choices.first[:, -1] - choices.first[:, 0]
-    soc = battery_model.soc(pack, np.clip(energy_j[:-1], *problem.window_j))
-    voltage, discharge, charge = (
-        np.repeat(np.interp(soc, pack.soc, curve), counts)
-        for curve in (pack.open_circuit_v, pack.discharge_ohm, pack.charge_ohm)
-    )
-    resistance = np.where(choices.power_w < 0, charge, discharge)
-    drain_w = battery_model.chemical_power_w(pack, choices.power_w, voltage, resistance)
-    return drain_w * step_of_entry(choices)

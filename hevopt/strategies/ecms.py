@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._prices_kernels import shortest_path
-from hevopt.battery import chemical_power_w
-from hevopt.choices import Choices, choices_of
+from hevopt.choices import choices_of
 from hevopt.errors import SolverError
-from hevopt.prices import one_price_dual, step_of_entry, typical_price_kgpj
+from hevopt.prices import drain_at_j, one_price_dual, typical_price_kgpj
 from hevopt.problem import Plan, Problem
 from hevopt.simulation import total_cost_kg
 from hevopt.strategies._rollout import reach_of, roll
@@ -36,16 +35,14 @@ class _Search:
         self.choices = choices_of(problem)
         self.bound_reach = reach_of(problem, self.choices, problem.end_min_j)
         self.free_reach = reach_of(problem, self.choices, problem.window_j[0])
-        self.drain_j = _drain_at_start_j(problem, self.choices)
-        counts = self.choices.first[:, -1] - self.choices.first[:, 0]
-        self.step = np.repeat(np.arange(self.choices.steps), counts)
+        self.drain_j = drain_at_j(problem, self.choices, problem.start_j)
         self.best_cost_kg, self.best_control, self.best_prices = np.inf, None, None
 
     def surplus_j(self, price_kgpj: Array, *, to_the_end: bool = False) -> float:
         """Stored energy above the asked end charge under (time,) prices; `to_the_end`: never below it."""
         low, high = self.problem.window_j
         choices = self.choices
-        priced = choices.cost_kg + price_kgpj[self.step] * self.drain_j
+        priced = choices.cost_kg + choices.spread(price_kgpj) * self.drain_j
         _, _, to_go = shortest_path(
             choices.first,
             priced,
@@ -121,16 +118,3 @@ def _neutral_factors(search: _Search, guess: float) -> tuple[float, float]:
         else:
             cheap = middle
     return cheap, dear
-
-
-def _drain_at_start_j(problem: Problem, choices: Choices) -> Array:
-    """(entry,) fall of stored energy at the start's state of charge, for planning the mode path."""
-    soc, pack = problem.soc_start, problem.battery
-    resistance = np.where(
-        choices.power_w < 0,
-        np.interp(soc, pack.soc, pack.charge_ohm),
-        np.interp(soc, pack.soc, pack.discharge_ohm),
-    )
-    voltage = np.interp(soc, pack.soc, pack.open_circuit_v)
-    drain_w = chemical_power_w(pack, choices.power_w, voltage, resistance)
-    return drain_w * step_of_entry(choices)
