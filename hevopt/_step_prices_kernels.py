@@ -37,15 +37,21 @@ def costate(energy, power, step_s, battery):
 
 
 @compiled()
+def _worth_with_first_step(first, power, step_s, price, rollout, battery):
+    """(entry,) with the first step's entries filled: there x is the start's, and has no price of its own."""
+    worth = np.empty(len(power))
+    for i in range(first[0, 0], first[0, -1]):
+        worth[i] = price[0] * step_s[0] * drain_and_slope(power[i], rollout[0], battery)[0]
+    return worth
+
+
+@compiled()
 def worth_by_tangents(first, power, step_s, price, rollout, low, high, battery):
     """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex in x."""
-    worth = np.empty(len(power))
-    for k in range(len(step_s)):
+    worth = _worth_with_first_step(first, power, step_s, price, rollout, battery)
+    for k in range(1, len(step_s)):
         after = price[k]
         for i in range(first[k, 0], first[k, -1]):
-            if k == 0:
-                worth[i] = after * step_s[0] * drain_and_slope(power[i], rollout[0], battery)[0]
-                continue
             tilt = price[k - 1] - after
             middle = min(max(rollout[k], low), high)
             best = -np.inf
@@ -80,14 +86,11 @@ def worth_by_cells(
     first, power, step_s, price, rollout, edges, voltage, discharge, charging, battery
 ):
     """As worth_by_tangents, for any curves: the least over cells, r from below within each."""
-    worth = np.empty(len(power))
+    worth = _worth_with_first_step(first, power, step_s, price, rollout, battery)
     efficiency = battery.coulombic_efficiency
-    for k in range(len(step_s)):
+    for k in range(1, len(step_s)):
         after = price[k]
         for i in range(first[k, 0], first[k, -1]):
-            if k == 0:
-                worth[i] = after * step_s[0] * drain_and_slope(power[i], rollout[0], battery)[0]
-                continue
             tilt = price[k - 1] - after
             best = np.inf
             for c in range(len(voltage)):

@@ -12,10 +12,9 @@ A bound holds for the tabulated controls, for every strategy alike. The first th
 moving with it by their price at the end; the last one for the asked end charge or more.
 """
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
+from math import inf
 
 from hevopt.errors import SolverError
 from hevopt.lower_dp import lower_bound_kg
@@ -74,31 +73,17 @@ def certify(
         return certificate
     worth = certificate.price_kgpj
     certificate.proofs["costate prices"] = costate_dual(problem, rollout)
-    for kind, climb in _rungs(problem, rollout, certificate, worth):
-        if _gap(certificate, rollout) <= target_gap:
-            break
-        climb(kind)
-    return certificate
-
-
-def _rungs(
-    problem: Problem, rollout: Trajectory, certificate: Certificate, worth_kgpj: float
-) -> list[tuple[str, Callable[[str], None]]]:
-    """Kinds of proof beyond the first two, in order of effort, and what adds each to the certificate."""
-
-    def lines(shape: Callable[[Problem, Trajectory], list[Line]], kind: str) -> None:
+    if _gap(certificate, rollout) > target_gap and _touches_window(problem, rollout):
         # Without prices there is no proof of this kind; the next one needs none.
         with suppress(SolverError):
-            certificate.proofs[kind] = shape(problem, rollout)
-
-    def lower(nodes: int, kind: str) -> None:
-        bound = lower_bound_kg(problem, worth_kgpj, nodes=nodes)
-        certificate.at_least[kind] = max(bound, certificate.at_least.get(kind, bound))
-
-    rungs = [("lower-bound DP", partial(lower, nodes)) for nodes in LOWER_DP_NODES]
-    if _touches_window(problem, rollout):
-        return [("LP prices", partial(lines, lp_dual)), *rungs]
-    return rungs
+            certificate.proofs["LP prices"] = lp_dual(problem, rollout)
+    for nodes in LOWER_DP_NODES:
+        if _gap(certificate, rollout) <= target_gap:
+            break
+        best = certificate.at_least.get("lower-bound DP", -inf)
+        bound = lower_bound_kg(problem, worth, nodes=nodes)
+        certificate.at_least["lower-bound DP"] = max(best, bound)
+    return certificate
 
 
 def _touches_window(problem: Problem, rollout: Trajectory) -> bool:

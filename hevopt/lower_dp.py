@@ -36,14 +36,13 @@ from hevopt.problem import Problem
 from hevopt.step_prices import convex_in_energy, window_cells
 
 Array = NDArray[np.float64]
-NODES = 4001
 _PIECES = 16
 _PIECES_CURVED = 256
 # Slope below the window and for missing end charge, in multiples of what charge is worth.
 _STEEPNESS = 4.0
 
 
-def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int = NODES) -> float:
+def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
     """A bound on the cost of every plan that ends with at least the asked charge.
 
     price_kgpj: about what stored energy is worth; it sets the slope of the relaxation, any value is valid.

@@ -8,19 +8,6 @@ from hevopt._prices_kernels import shortest_path
 
 
 @compiled()
-def drains(first, power, step_s, energy, battery):
-    """(entry,) fall of stored energy of every choice at one stored energy."""
-    result = np.empty(len(power))
-    _, voltage, discharge, charging = state_at(energy, battery)
-    for k in range(len(first)):
-        for i in range(first[k, 0], first[k, -1]):
-            result[i] = step_s[k] * chemical_power(
-                power[i], voltage, discharge, charging, battery.coulombic_efficiency
-            )
-    return result
-
-
-@compiled()
 def falling_hull(first, cost, drain):
     """Lower convex hull of each block's cost over drained energy, where cost falls: its entries and their starts.
 

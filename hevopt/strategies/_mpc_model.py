@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hevopt.choices import Choices, choices_of
 from hevopt.errors import InfeasibleError
+from hevopt.prices import drain_at_j
 from hevopt.problem import Problem, Signals
 from hevopt.strategies import _mpc_kernels as kernels
 
@@ -44,9 +45,7 @@ def model_of(problem: Problem, horizon_s: float) -> Model:
     """The model of a problem under a preview of `horizon_s`."""
     choices, time_s = choices_of(problem), problem.table.time_s
     _check_rows(problem, choices)
-    drain_j = kernels.drains(
-        choices.first, choices.power_w, choices.step_s, problem.start_j, problem.battery.arrays
-    )
+    drain_j = drain_at_j(problem, choices, problem.start_j)
     listed = choices.cost_kg, drain_j
     fit = kernels.fits(choices.first, *listed, *kernels.falling_hull(choices.first, *listed))
     whole_steps = np.ascontiguousarray(choices.first[:, [0, -1]])
