@@ -117,21 +117,12 @@ def compare(
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
-    every = list(strategies or ()) == ["all"]
-    if strategies is not None and not every:
-        _check_strategies(strategies)
-    cars = _cars(
-        shipped_names("architectures", ".toml") if architectures is None else architectures
-    )
-    cars = [car.with_free_gear() for car in cars] if free_gear else cars
-    plans = [
-        (car, fitting(car.functions, every=every) if every or not strategies else list(strategies))
-        for car in cars
-    ]
-    total, done = sum(len(names) for _, names in plans), 0
+    plans = _plans(architectures, strategies, free_gear)
+    total = sum(len(names) for _, names in plans)
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
     for car, wanted in plans:
+        done = len(rows)
         progress(f"{car.name}: table and certificate", done, total)
         try:
             case = prepare(
@@ -144,18 +135,35 @@ def compare(
         except (InfeasibleError, SolverError) as error:
             failures[car.name] = error
             rows += [_failed(car, name, error) for name in wanted]
-            done += len(wanted)
             continue
-        for name in wanted:
-            progress(f"{car.name}: {name}", done, total)
+        for n, name in enumerate(wanted):
+            progress(f"{car.name}: {name}", done + n, total)
             try:
                 rows.append(run_case(case, name, horizon_s)[0])
             except (InfeasibleError, SolverError) as error:
                 failures[f"{car.name} {name}"] = error
                 rows.append(_failed(car, name, error))
-            done += 1
     rows, reference = _against_reference(rows)
     return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear)
+
+
+def _plans(
+    architectures: Sequence[Architecture | str | Path] | None,
+    strategies: Sequence[str] | None,
+    free_gear: bool,
+) -> list[tuple[Architecture, list[str]]]:
+    """Every car, and the names of the strategies to run on it."""
+    every = list(strategies or ()) == ["all"]
+    if strategies is not None and not every:
+        _check_strategies(strategies)
+    cars = _cars(
+        shipped_names("architectures", ".toml") if architectures is None else architectures
+    )
+    cars = [car.with_free_gear() for car in cars] if free_gear else cars
+    return [
+        (car, fitting(car.functions, every=every) if every or not strategies else list(strategies))
+        for car in cars
+    ]
 
 
 def steps_of(cycle: str | Path) -> int:

@@ -3,9 +3,12 @@
 The enumeration does not use hevopt's battery or simulation: it has its own scalar battery step.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from hevopt import Battery, Control, ControlTable, Problem
+from hevopt.problem import Signals
 
 
 def random_battery(rng: np.random.Generator, curved: bool) -> Battery:
@@ -94,3 +97,23 @@ def _drain_w(pack: Battery, power: float, energy: np.ndarray) -> np.ndarray:
         current = (volt - np.sqrt(volt**2 - 4 * ohm * power)) / (2 * ohm)
         result[n] = volt * current * (pack.coulombic_efficiency if current < 0 else 1.0)
     return result
+
+
+def rows(problem: Problem, order: np.ndarray) -> Problem:
+    """The problem with other rows, in the order given; start times and missing torque left out of it."""
+    table = problem.table
+    fields = ("speed_mps", "wheel_power_w", "gear", "clutch_open")
+    step_s = table.step_s[order]
+    changed = replace(
+        table,
+        time_s=np.cumsum(step_s) - step_s,
+        step_s=step_s,
+        fuel_kg=table.fuel_kg[order],
+        nox_kg=table.nox_kg[order],
+        battery_power_w=table.battery_power_w[order],
+        reject=table.reject[order],
+        signals=Signals(*(getattr(table.signals, name)[order] for name in fields)),
+        flows={},
+        missing_torque_nm=None,
+    )
+    return replace(problem, table=changed)

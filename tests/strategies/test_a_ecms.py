@@ -1,44 +1,16 @@
 """Adaptive ECMS: causal, within the window, neutral by its own feedback, and never below the bound."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from conftest import CYCLES, HYBRIDS
-from problems import random_problem
+from problems import random_problem, rows
 
 from hevopt import Battery, ControlTable, DataError, Problem, certify, simulate
-from hevopt.problem import Signals
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import a_ecms, dp
 
 HEATING_VALUE_JPKG = 42.9e6
 CUTS = (1, 137, 400, 800)
-
-
-def rows(problem: Problem, order: np.ndarray) -> Problem:
-    """The problem with other rows, in the order given; start times and missing torque left out of it."""
-    table = problem.table
-    signals = Signals(
-        *(
-            getattr(table.signals, n)[order]
-            for n in ("speed_mps", "wheel_power_w", "gear", "clutch_open")
-        )
-    )
-    step_s = table.step_s[order]
-    changed = replace(
-        table,
-        time_s=np.cumsum(step_s) - step_s,
-        step_s=step_s,
-        fuel_kg=table.fuel_kg[order],
-        nox_kg=table.nox_kg[order],
-        battery_power_w=table.battery_power_w[order],
-        reject=table.reject[order],
-        signals=signals,
-        flows={},
-        missing_torque_nm=None,
-    )
-    return replace(problem, table=changed)
 
 
 def gained_percent(problem, trajectory) -> float:

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import CYCLES
+from problems import rows
 
-from hevopt import DataError, Problem, certify, simulate
+from hevopt import DataError, certify, simulate
 from hevopt.problem import Plan, Signals
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import dp, sdp
@@ -23,26 +24,6 @@ def plan_of(problem_of):
         return sdp.solve(problem_of(architecture, cycle), others)
 
     return plan
-
-
-def rows(problem: Problem, order: np.ndarray) -> Problem:
-    """The problem with other rows, in the order given."""
-    table = problem.table
-    fields = ("speed_mps", "wheel_power_w", "gear", "clutch_open")
-    step_s = table.step_s[order]
-    changed = replace(
-        table,
-        time_s=np.cumsum(step_s) - step_s,
-        step_s=step_s,
-        fuel_kg=table.fuel_kg[order],
-        nox_kg=table.nox_kg[order],
-        battery_power_w=table.battery_power_w[order],
-        reject=table.reject[order],
-        signals=Signals(*(getattr(table.signals, name)[order] for name in fields)),
-        flows={},
-        missing_torque_nm=None,
-    )
-    return replace(problem, table=changed)
 
 
 def test_a_decision_does_not_change_when_the_cycle_after_it_changes(problem_of):
