@@ -3,9 +3,6 @@
 import csv
 import io
 import json
-import os
-import stat
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,11 +12,11 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.errors import DataError
 from hevopt.problem import Plan, Problem, Trajectory
 from hevopt.published import published_beside
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison, Row
+from hevopt.writing import write_whole
 
 _CAUSAL_MARK = "†"
 
@@ -271,57 +268,6 @@ def write_table(path: Path, problem: Problem) -> None:
         battery_coulombic_efficiency=pack.coulombic_efficiency,
     )  # fmt: skip
     write_whole(path, contents.getvalue())
-
-
-def check_writable(path: Path) -> Path:
-    """The file that a path stands for, links followed; DataError where `write_whole` could not write it."""
-    try:
-        target = path.resolve()
-        if target.is_dir():
-            fault = "Is a folder"
-        elif target.exists() and not target.is_file():
-            fault = "Not a regular file"
-        elif target.exists() and not os.access(target, os.W_OK):
-            fault = "Read-only file"
-        elif not target.parent.is_dir():
-            fault = "No such folder"
-        elif not os.access(target.parent, os.W_OK):
-            fault = "Read-only folder"
-        else:
-            return target
-    except OSError as error:
-        fault = str(error.strerror)
-    except RuntimeError:
-        fault = "Links in a circle"
-    raise DataError(f"{path}: cannot be written ({fault}); choose another place")
-
-
-def write_whole(path: Path, contents: bytes) -> None:
-    """Write a file at once: killed in the middle, the old one is whole."""
-    target, temporary = check_writable(path), None
-    try:
-        with tempfile.NamedTemporaryFile(dir=target.parent, prefix=".hevopt.", delete=False) as f:
-            temporary = Path(f.name)
-            f.write(contents)
-            f.flush()
-            os.fsync(f.fileno())
-        temporary.chmod(_mode_of(target))
-        temporary.replace(target)
-    except OSError as error:
-        raise DataError(
-            f"{path}: cannot be written ({error.strerror}); choose another place"
-        ) from None
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-
-
-def _mode_of(target: Path) -> int:
-    if target.exists():
-        return stat.S_IMODE(target.stat().st_mode)
-    umask = os.umask(0)
-    os.umask(umask)
-    return 0o666 & ~umask
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,1 @@
+"""The commands of `hevopt`, by subject; cli.py puts them together."""

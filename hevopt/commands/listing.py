@@ -1,0 +1,78 @@
+"""`hevopt architectures`, `cycles` and `strategies`: what there is to choose from."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hevopt.commands.terminal import Progress, write
+
+architectures_app = typer.Typer(help="The shipped architectures.", rich_markup_mode=None)
+cycles_app = typer.Typer(
+    help="The shipped cycles, with duration, distance, top speed and whether they list gears.",
+    rich_markup_mode=None,
+)
+
+
+@architectures_app.callback(invoke_without_command=True)
+def architectures(context: typer.Context) -> None:
+    """The shipped architectures."""
+    if context.invoked_subcommand:
+        return
+    from hevopt.architecture import load_architecture
+    from hevopt.files import shipped_names
+    from hevopt.strategies import fitting
+
+    for name in shipped_names("architectures", ".toml"):
+        car = load_architecture(name)
+        write(f"{name:4} {car.description:45} {', '.join(fitting(car.functions))}")
+
+
+@cycles_app.callback(invoke_without_command=True)
+def cycles(context: typer.Context) -> None:
+    """The shipped cycles, with duration, distance, top speed and whether they list gears."""
+    if context.invoked_subcommand:
+        return
+    from hevopt.cycle import load_cycle
+    from hevopt.files import shipped_names
+
+    for name in shipped_names("cycles", ".csv"):
+        trace = load_cycle(name)
+        gears = "gears listed" if trace.gear is not None else "gears from shift speeds"
+        write(
+            f"{name:18} {trace.duration_s:6.0f} s {trace.distance_m / 1e3:7.2f} km "
+            f"{trace.speed_mps.max() * 3.6:6.1f} km/h  {gears}"
+        )
+
+
+def strategies(
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Run them all on C2 and D over all shipped cycles; write a page."
+        ),
+    ] = None,
+) -> None:
+    """The strategies, and what each knows while it drives."""
+    from hevopt import report, study
+    from hevopt.files import shipped_names
+    from hevopt.strategies import STRATEGIES
+    from hevopt.writing import check_writable, write_whole
+
+    if out is None:
+        for name, strategy in STRATEGIES.items():
+            kind = "causal" if strategy.causal else "offline"
+            write(f"{name:13} {kind:8} knows: {strategy.knows}")
+        return
+    check_writable(out)
+    with Progress() as progress:
+        comparisons = [
+            study.compare(
+                cycle, ["C2", "D"], ["all"], allow_shortfall=True,
+                progress=lambda text, done, total, c=cycle: progress(f"{c}, {text}", done, total),
+            )
+            for cycle in shipped_names("cycles", ".csv")
+        ]  # fmt: skip
+    steps = {c.cycle: study.steps_of(c.cycle) for c in comparisons}
+    write_whole(out, report.strategies_page(comparisons, steps).encode())
+    write(f"written to {out}")

@@ -1,0 +1,87 @@
+"""What all commands share: printing, progress, checks of what a user names."""
+
+import os
+import sys
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import typer
+
+from hevopt.errors import DataError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_PROGRESS_AFTER_S = 2.0
+_WIDEST = 400
+
+
+def listed(text: str | None) -> list[str] | None:
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
+def check_out(out: Path, architecture: str, cycle: str) -> None:
+    """DataError, before anything is solved, where `out` cannot be written or is one of the inputs."""
+    from hevopt.files import find
+    from hevopt.writing import check_writable
+
+    target = check_writable(out)
+    for kind, name, suffix in (("architectures", architecture, ".toml"), ("cycles", cycle, ".csv")):
+        if target.exists() and target.samefile(find(kind, name, suffix)):
+            raise DataError(f"--out {out} is the file that {name} is read from; choose another")
+
+
+def show(table: "Table") -> None:
+    """Print a table; a terminal narrower than its numbers wraps lines rather than losing digits."""
+    from rich.console import Console
+
+    needed = Console(width=_WIDEST).measure(table).maximum
+    console = Console(highlight=False, width=max(Console().width, needed))
+    with console.capture() as capture:
+        console.print(table)
+    write(capture.get().removesuffix("\n"))
+
+
+def write(text: str) -> None:
+    """The only way to standard output."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        # What is left in the buffer would fail once more when Python ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            raise typer.Exit from None  # the reader, such as `head`, has seen enough
+        raise DataError(f"cannot write to standard output ({error.strerror})") from None
+
+
+class Progress:
+    """A line on stderr about what is running, once that has taken more than two seconds."""
+
+    def __enter__(self) -> "Progress":
+        self._began = self._said_s = monotonic()
+        self._status = None
+        return self
+
+    def __call__(self, text: str, done: int, total: int) -> None:
+        now = monotonic()
+        if now - self._began > _PROGRESS_AFTER_S:
+            self._say(f"{done} of {total} done, next {text}", now)
+
+    def _say(self, line: str, now: float) -> None:
+        from rich.console import Console
+        from rich.text import Text
+
+        console = Console(stderr=True)
+        if self._status is not None:
+            self._status.update(Text(line))
+        elif console.is_terminal:
+            self._status = console.status(Text(line))
+            self._status.start()
+        elif now - self._said_s > _PROGRESS_AFTER_S:
+            self._said_s = now
+            print(f"hevopt: {line}", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            self._status.stop()
