@@ -1,14 +1,14 @@
 """Architecture and component files: TOML, checked by pydantic, read into frozen types.
 
 An architecture names its components; a name is looked for in `components/` beside the file, then among the
-shipped ones, and a path is relative to the file.
+shipped ones, and a path is relative to the file. Any key of either can be changed on reading, by its path.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -24,10 +24,11 @@ from hevopt.architecture_files import (
     MachineFile,
 )
 from hevopt.battery import Battery
-from hevopt.datafile import Model, read_toml
+from hevopt.datafile import Model, checked, read_contents
 from hevopt.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
 from hevopt.errors import DataError
-from hevopt.files import find, is_path, shipped_folder, shown
+from hevopt.files import find, is_path, printable, shipped_folder, shown
+from hevopt.keypaths import merged, with_changes
 from hevopt.machine import Machine
 from hevopt.transmission import Gearbox
 from hevopt.units import STANDARD_GRAVITY_MPS2, TO_SI
@@ -35,6 +36,7 @@ from hevopt.vehicle import Vehicle
 
 Built = TypeVar("Built")
 _MASS_MIN_KG = 50.0
+COMPONENTS = ("car", "engine", "gearbox", "machine", "battery")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,12 @@ class Coupling:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Architecture:
-    """A complete car: every component, the coupling and the functions it may use."""
+    """A complete car: every component, the coupling and the functions it may use.
+
+    soc_end: least state of charge at the end of a cycle
+    contents: keys and values as read, changes made, the components' tables in place of their names
+    files: where they were read from, the architecture first
+    """
 
     name: str
     description: str
@@ -61,10 +68,17 @@ class Architecture:
     machine: Machine
     battery: Battery
     soc_start: float
+    soc_end: float
     coupling: Coupling
     functions: frozenset[str]
     gear: Literal["cycle", "free"]
-    source: Path
+    contents: Mapping[str, Any]
+    files: tuple[Path, ...]
+
+    @property
+    def source(self) -> Path:
+        """The architecture's own file."""
+        return self.files[0]
 
     def with_free_gear(self) -> "Architecture":
         """The same car with the engine's gear as a control; DataError where its gearbox does not allow it."""
@@ -73,20 +87,34 @@ class Architecture:
                 f"{self.source}: gear 'free' needs the table [free_gear] with shift_fuel_g and "
                 f"engine_speed_min_rpm in the file of gearbox {self.gearbox.name!r}"
             )
-        return replace(self, gear="free")
+        return replace(self, gear="free", contents={**self.contents, "gear": "free"})
 
 
-def load_architecture(name: str | Path) -> Architecture:
-    """The architecture of a shipped name (`C2`) or a TOML file's path."""
+def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None) -> Architecture:
+    """The architecture of a shipped name (`C2`) or a TOML file's path.
+
+    changes: key path -> value in place of the file's, such as {"hybrid_mass_kg": 80, "machine.power_max_w": 2e4};
+    a path that begins with a component goes into that component's file. Raises DataError as for the file itself.
+    """
     path = find("architectures", name, ".toml")
-    data = read_toml(path, ArchitectureFile)
-    battery, soc_start = _component(
-        path, "battery", data.battery, BatteryFile, lambda file: (_battery(file), file.soc.start)
-    )
-    vehicle = _component(
-        path, "car", data.car, CarFile, lambda file: _vehicle(file, data.hybrid_mass_kg)
-    )
-    gearbox = _component(path, "gearbox", data.gearbox, GearboxFile, _gearbox)
+    own, of_parts = _sorted_changes(changes or {})
+    contents = with_changes(read_contents(path), own)
+    data = checked(_place(path, own), contents, ArchitectureFile)
+    contents, files = dict(contents), [path]
+
+    def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built:
+        found, table = _component_table(path, key, getattr(data, key), of_parts[key])
+        contents[key] = table
+        files.append(found)
+        place = _place(found, {f"{key}.{name}": 0 for name in of_parts[key]})
+        file = checked(place, table, model)
+        try:
+            return build(file)
+        except DataError as error:
+            raise DataError(f"{place}: {error}") from None
+
+    battery, soc = part("battery", BatteryFile, lambda file: (_battery(file), file.soc))
+    gearbox = part("gearbox", GearboxFile, _gearbox)
     if data.coupling.kind == "even_shaft" and len(gearbox.ratios) < 3:
         raise DataError(
             f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
@@ -95,35 +123,57 @@ def load_architecture(name: str | Path) -> Architecture:
     car = Architecture(
         name=data.name,
         description=data.description,
-        vehicle=vehicle,
-        engine=_component(path, "engine", data.engine, EngineFile, _engine),
+        vehicle=part("car", CarFile, lambda file: _vehicle(file, data.hybrid_mass_kg)),
+        engine=part("engine", EngineFile, _engine),
         gearbox=gearbox,
-        machine=_component(path, "machine", data.machine, MachineFile, _machine),
+        machine=part("machine", MachineFile, _machine),
         battery=battery,
-        soc_start=soc_start,
+        soc_start=soc.start,
+        soc_end=soc.start if soc.end is None else soc.end,
         coupling=_coupling(data.coupling),
         functions=frozenset(data.functions),
         gear="cycle",
-        source=path,
+        contents=contents,
+        files=tuple(files),
     )
     return car.with_free_gear() if data.gear == "free" else car
 
 
-def _component(
-    path: Path, key: str, name: str, model: type[Model], build: Callable[[Model], Built]
-) -> Built:
-    """A component of the architecture file at `path`, built from the file that its key names."""
+def _sorted_changes(
+    changes: Mapping[str, Any],
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Changes of the architecture's own keys, and component -> changes in its file."""
+    own: dict[str, Any] = {}
+    of_parts: dict[str, dict[str, Any]] = {key: {} for key in COMPONENTS}
+    for key, value in changes.items():
+        first, _, rest = key.partition(".")
+        if first in of_parts and rest:
+            of_parts[first][rest] = value
+        else:
+            own[key] = value
+    return own, of_parts
+
+
+def _component_table(
+    path: Path, key: str, component: str | dict[str, Any], changes: Mapping[str, Any]
+) -> tuple[Path, dict[str, Any]]:
+    """The file that an architecture's key names, and its contents with what replaces them."""
+    name = component if isinstance(component, str) else component["file"]
     beside = path.parent if is_path(name, ".toml") else path.parent / "components"
     folder = beside if beside.is_dir() else shipped_folder("architectures") / "components"
     try:
         found = find("architectures/components", name, ".toml", beside=folder)
     except DataError as error:
         raise DataError(f"{path}, {key}: {error}") from None
-    file = read_toml(found, model)
-    try:
-        return build(file)
-    except DataError as error:
-        raise DataError(f"{found}: {error}") from None
+    table = read_contents(found)
+    if isinstance(component, dict):
+        table = merged(table, {k: value for k, value in component.items() if k != "file"})
+    return found, with_changes(table, changes)
+
+
+def _place(path: Path, changes: Mapping[str, Any]) -> str:
+    """How a message names a file, and what was changed in it."""
+    return f"{path}, with {', '.join(map(printable, changes))} changed" if changes else str(path)
 
 
 def _coupling(data: CouplingFile) -> Coupling:

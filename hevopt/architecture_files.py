@@ -4,7 +4,7 @@ Keys carry their unit as a suffix; bounds are wide where physics sets none, and 
 """
 
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
@@ -23,7 +23,7 @@ def _on_one_line(text: str) -> str:
     return text
 
 
-Number, List, Table = map(Tag, SHAPES)
+Number, List, Table, Named = map(Tag, SHAPES)
 Shape = Discriminator(shape_of)
 Name = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_on_one_line)]
 Description = Annotated[str, Field(max_length=500), AfterValidator(_on_one_line)]
@@ -43,6 +43,19 @@ Ohm = Annotated[Annotated[NotNegative, Number] | Annotated[list[NotNegative], Li
 _MAP_MAX = 1e6
 # exp() of more than this overflows.
 _EXPONENT_MAX = 700.0
+
+
+def _names_a_file(table: dict[str, Any]) -> dict[str, Any]:
+    if not isinstance(table.get("file"), str):
+        raise ValueError('a table needs file = "name"; its other keys replace those of that file')
+    return table
+
+
+# A component: the name or path of its file, or a table {file, ...} whose other keys replace the file's.
+Component = Annotated[
+    Annotated[str, Named] | Annotated[dict[str, Any], AfterValidator(_names_a_file), Table],
+    Discriminator(lambda value: "a table" if isinstance(value, dict) else "a name"),
+]
 
 
 class CouplingFile(FileModel):
@@ -74,15 +87,15 @@ class CouplingFile(FileModel):
 
 
 class ArchitectureFile(FileModel):
-    """An architecture: its components' names, functions (Table 1) and coupling."""
+    """An architecture: its components, functions (Table 1) and coupling."""
 
     name: Name
     description: Description = ""
-    car: str
-    engine: str
-    gearbox: str
-    machine: str
-    battery: str
+    car: Component
+    engine: Component
+    gearbox: Component
+    machine: Component
+    battery: Component
     hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
     functions: list[Function]
     gear: Literal["cycle", "free"] = "cycle"
@@ -327,9 +340,12 @@ class LinearVoltageFile(FileModel):
 
 
 class SocFile(FileModel):
+    """Window and start of the state of charge; `end` is the least at the end, by default the start."""
+
     start: Soc
     min: Soc
     max: Soc
+    end: Soc | None = None
 
     @model_validator(mode="after")
     def _window(self):
@@ -337,6 +353,8 @@ class SocFile(FileModel):
             raise ValueError(f"empty window: min {self.min:g} must be below max {self.max:g}")
         if not self.min <= self.start <= self.max:
             raise ValueError(f"start {self.start:g} must lie in [{self.min:g}, {self.max:g}]")
+        if self.end is not None and not self.min <= self.end <= self.max:
+            raise ValueError(f"end {self.end:g} must lie in [{self.min:g}, {self.max:g}]")
         return self
 
 

@@ -40,6 +40,7 @@ class Cycle:
 
     time_s, speed_mps: (sample,)
     gear: (sample,) 0 neutral; clutch_open: (sample,) bool; grade: (sample,) rise / run
+    source: the file it was read from, None for a trace that came from none
     """
 
     name: str
@@ -48,6 +49,7 @@ class Cycle:
     grade: NDArray[np.float64]
     gear: NDArray[np.int64] | None = None
     clutch_open: NDArray[np.bool_] | None = None
+    source: Path | None = None
 
     def __post_init__(self) -> None:
         for field in ("time_s", "speed_mps", "grade", "gear", "clutch_open"):
@@ -85,7 +87,9 @@ def load_cycle(name: str | Path) -> Cycle:
         gear = _whole_numbers(path, lines, "gear", columns["gear"], 20)
         clutch = columns.get("clutch_open", np.zeros(len(rows)))
         clutch_open = _whole_numbers(path, lines, "clutch_open", clutch, 1).astype(bool)
-    cycle = Cycle(printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open)
+    cycle = Cycle(
+        printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open, path
+    )
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(
             f"{path}: distance {cycle.distance_m:.3g} m; a cycle must cover {DISTANCE_MIN_M:g} m or "

@@ -15,7 +15,7 @@ from hevopt.files import printable, read_text, shown
 _MEGABYTES_MAX = 5
 _FAULTS_LISTED = 20
 # Tags by which a key takes values of several shapes; they stand in a fault's location, not in the file.
-SHAPES = ("a number", "a list", "a table")
+SHAPES = ("a number", "a list", "a table", "a name")
 _NEEDED = {
     "model_type": "a table [{place}] is needed",
     "dict_type": "a table [{place}] is needed",
@@ -52,19 +52,28 @@ def shape_of(value: object) -> str:
 
 def read_toml(path: Path, model: type[Model]) -> Model:
     """The file's contents as a checked model."""
+    return checked(str(path), read_contents(path), model)
+
+
+def read_contents(path: Path) -> dict[str, Any]:
+    """The file's contents as they stand, keys to values."""
     try:
-        contents = tomllib.loads(read_text(path, _MEGABYTES_MAX))
+        return tomllib.loads(read_text(path, _MEGABYTES_MAX))
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"{path}: not valid TOML: {error}") from None
     except ValueError:
         raise DataError(f"{path}: not valid TOML: a number has too many digits") from None
     except RecursionError:
         raise DataError(f"{path}: nested too deeply for a data file") from None
+
+
+def checked(place: str, contents: dict[str, Any], model: type[Model]) -> Model:
+    """Contents as a model; DataError with every fault, `place` in front, where they are not what it allows."""
     try:
         return model.model_validate(contents)
     except ValidationError as error:
         faults = [_fault(model, dict(fault)) for fault in error.errors()]
-        head = f"{path}: " if len(faults) == 1 else f"{path}: {len(faults)} faults\n  "
+        head = f"{place}: " if len(faults) == 1 else f"{place}: {len(faults)} faults\n  "
         more = len(faults) - _FAULTS_LISTED
         listed = faults[:_FAULTS_LISTED] + ([f"and {more} more"] if more > 0 else [])
         raise DataError(head + "\n  ".join(listed)) from None

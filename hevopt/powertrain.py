@@ -54,11 +54,10 @@ def build_problem(
     *,
     levels: int = TORQUE_LEVELS,
     nox_weight: float = 0.0,
-    soc_start: float | None = None,
     allow_shortfall: bool = False,
     around: Around | None = None,
 ) -> Problem:
-    """The energy-management problem of a car on a cycle, charge at the end no less than at the start.
+    """The energy-management problem of a car on a cycle, charge at the end no less than the car's `soc_end`.
 
     levels: machine torques per step and joint; nox_weight: kg of fuel that a kg of NOx counts;
     around: where to add torques with the engine on, see `torques_of`.
@@ -73,8 +72,9 @@ def build_problem(
     table = build_table(
         architecture, demand, levels=levels, allow_shortfall=allow_shortfall, around=around
     )
-    start = architecture.soc_start if soc_start is None else soc_start
-    return Problem(table, architecture.battery, start, start, 0, nox_weight)
+    return Problem(
+        table, architecture.battery, architecture.soc_start, architecture.soc_end, 0, nox_weight
+    )
 
 
 def build_table(

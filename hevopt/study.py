@@ -1,6 +1,6 @@
 """The study: run strategies on architectures over one cycle, and collect a row for each."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from math import isfinite
 from pathlib import Path
@@ -34,8 +34,11 @@ class Row:
     """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
     no reference, no fuel, or a bound of 0.
 
-    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy), "shortfall" (steps
-    driven with less than the cycle asks), joined by commas, or "failed: ..." with the reason
+    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy; "end charge missed" where
+    another end charge than the start's is asked), "shortfall" (steps driven with less than the cycle asks), joined
+    by commas, or "failed: ..." with the reason
+    delta_energy_percent: stored energy at the end above what is asked, as a share of the fuel's;
+    fuel_corrected_l_per_100km: fuel less what that energy is worth
     bound_l_per_100km: least of fuel + weighted NOx that any plan with this row's end charge could reach,
     as fuel volume; gap_percent: this row's own sum above it
     """
@@ -102,14 +105,18 @@ def compare(
     free_gear: bool = False,
     refine: bool = False,
     horizon_s: float | None = None,
+    changes: Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+    observe: Callable[["Case", Row, Plan, Trajectory], None] = lambda *solved: None,
 ) -> Comparison:
     """Every strategy (by default the usual ones that fit) on every architecture (by default the shipped ones).
 
     strategies: names, or ["all"] for every one that fits. free_gear: the engine's gear is a control.
     refine: torque levels are added around dynamic programming's plan until its cost settles.
     horizon_s: preview of the predictive strategies, by default their own.
+    changes: key path -> value in every architecture that is read, see load_architecture.
     progress: called with what comes next, and how many cases of how many are done.
+    observe: called with every solved case, its row (no reference yet), plan and trajectory.
     """
     if not isinstance(cycle, Cycle):
         cycle = load_cycle(cycle)
@@ -117,7 +124,7 @@ def compare(
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
-    plans = _plans(architectures, strategies, free_gear)
+    plans = _plans(architectures, strategies, free_gear, changes)
     total = sum(len(names) for _, names in plans)
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
@@ -139,7 +146,9 @@ def compare(
         for n, name in enumerate(wanted):
             progress(f"{car.name}: {name}", done + n, total)
             try:
-                rows.append(run_case(case, name, horizon_s)[0])
+                solved = run_case(case, name, horizon_s)
+                rows.append(solved[0])
+                observe(case, *solved)
             except (InfeasibleError, SolverError) as error:
                 failures[f"{car.name} {name}"] = error
                 rows.append(_failed(car, name, error))
@@ -151,13 +160,15 @@ def _plans(
     architectures: Sequence[Architecture | str | Path] | None,
     strategies: Sequence[str] | None,
     free_gear: bool,
+    changes: Mapping[str, Any] | None,
 ) -> list[tuple[Architecture, list[str]]]:
     """Every car, and the names of the strategies to run on it."""
     every = list(strategies or ()) == ["all"]
     if strategies is not None and not every:
         _check_strategies(strategies)
     cars = _cars(
-        shipped_names("architectures", ".toml") if architectures is None else architectures
+        shipped_names("architectures", ".toml") if architectures is None else architectures,
+        changes,
     )
     cars = [car.with_free_gear() for car in cars] if free_gear else cars
     return [
@@ -171,9 +182,11 @@ def steps_of(cycle: str | Path) -> int:
     return len(load_cycle(cycle).time_s) - 1
 
 
-def _cars(wanted: Sequence[Architecture | str | Path]) -> list[Architecture]:
+def _cars(
+    wanted: Sequence[Architecture | str | Path], changes: Mapping[str, Any] | None
+) -> list[Architecture]:
     """The architectures, no two of one name: rows are told apart by it."""
-    cars = [a if isinstance(a, Architecture) else load_architecture(a) for a in wanted]
+    cars = [a if isinstance(a, Architecture) else load_architecture(a, changes) for a in wanted]
     if not cars:
         raise DataError("no architecture given; name at least one, or leave the list out for all")
     by_name: dict[str, Architecture] = {}
@@ -277,7 +290,7 @@ def _settings(case: Case, strategy: str, horizon_s: float | None) -> dict[str, A
 def _row(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
     car, cycle, problem, certificate = case.car, case.cycle, case.problem, case.certificate
     fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
-    gained_j = trajectory.end_j - problem.start_j
+    surplus_j = trajectory.end_j - problem.end_min_j
     fuel_j = fuel_kg * car.engine.heating_value_jpkg
     bound_kg, proof = certificate.bound_kg(trajectory.end_j)
 
@@ -287,14 +300,14 @@ def _row(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> R
     return Row(
         architecture=car.name,
         strategy=strategy,
-        status=_status(problem, gained_j, fuel_j),
+        status=_status(problem, surplus_j, fuel_j),
         fuel_l_per_100km=litres(fuel_kg),
         co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
         nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km,
         soc_start=float(trajectory.soc[0]),
         soc_end=float(trajectory.soc[-1]),
-        delta_energy_percent=_percent(gained_j, fuel_j),
-        fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * gained_j),
+        delta_energy_percent=_percent(surplus_j, fuel_j),
+        fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * surplus_j),
         engine_starts=engine_starts(problem, trajectory),
         bound_l_per_100km=litres(bound_kg),
         gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
@@ -318,10 +331,11 @@ def _percent(part: float, whole: float) -> float | None:
     return 100 * part / whole if whole > _TINY else None
 
 
-def _status(problem: Problem, gained_j: float, fuel_j: float) -> str:
+def _status(problem: Problem, surplus_j: float, fuel_j: float) -> str:
     marks = []
-    if 100 * abs(gained_j) > max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J):
-        marks.append("not neutral")
+    if 100 * abs(surplus_j) > max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J):
+        neutral = problem.end_min_j == problem.start_j
+        marks.append("not neutral" if neutral else "end charge missed")
     missing = problem.table.missing_torque_nm
     if missing is not None and (missing > 0).any():
         count = int((missing > 0).sum())
