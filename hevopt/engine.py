@@ -3,7 +3,7 @@
 Brake mean pressure p_me = 4 pi T / Vd (four-stroke). With coefficients, the fuel mean pressure p_mf solves
     p_me = (a + b cm + c cm²) p_mf + a2 p_mf² + l + l2 cm²
 (CO2MPAS, European Commission), so the drag torque is where p_mf = 0 and fuel is cut on overrun.
-A grid is interpolated bilinearly and never extrapolated: outside it the result is NaN.
+A grid is interpolated (grid.py) and never extrapolated: outside it the result is NaN.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,8 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hevopt.grid import interpolated
 
 Array = NDArray[np.float64]
 _PA_PER_BAR = 1e5
@@ -95,7 +97,7 @@ def drag_torque_nm(engine: Engine, speed_radps: Array) -> Array:
 def fuel_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> Array:
     """Fuel flow; 0 at or below the drag torque (fuel cut), NaN outside a measured grid."""
     if isinstance(engine.fuel, EngineGrid):
-        inside = _bilinear(engine.fuel, engine.fuel.fuel_kgps, torque_nm, speed_radps)
+        inside = _on_grid(engine.fuel, engine.fuel.fuel_kgps, torque_nm, speed_radps)
         cut = torque_nm <= drag_torque_nm(engine, speed_radps) + 1e-9
         return np.where(cut, 0.0, inside)
     k, cm = engine.fuel, _piston_speed_mps(engine, speed_radps)
@@ -112,7 +114,7 @@ def fuel_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> Array:
 def nox_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> Array:
     """NOx flow; 0 while the fuel is cut is the caller's to apply. NaN outside a measured grid."""
     if isinstance(engine.fuel, EngineGrid):
-        return _bilinear(engine.fuel, engine.fuel.nox_kgps, torque_nm, speed_radps)
+        return _on_grid(engine.fuel, engine.fuel.nox_kgps, torque_nm, speed_radps)
     if engine.nox is None:
         return np.zeros(np.broadcast(torque_nm, speed_radps).shape)
     k = engine.nox
@@ -146,20 +148,5 @@ def _mean_pressure_bar(engine: Engine, torque_nm: Array) -> Array:
     return 4 * pi * torque_nm / engine.displacement_m3 / _PA_PER_BAR
 
 
-def _bilinear(grid: EngineGrid, values: Array, torque_nm: Array, speed_radps: Array) -> Array:
-    speed, torque = np.broadcast_arrays(speed_radps, torque_nm)
-    i = np.clip(np.searchsorted(grid.speed_radps, speed, "right") - 1, 0, len(grid.speed_radps) - 2)
-    j = np.clip(np.searchsorted(grid.torque_nm, torque, "right") - 1, 0, len(grid.torque_nm) - 2)
-    x = (speed - grid.speed_radps[i]) / (grid.speed_radps[i + 1] - grid.speed_radps[i])
-    y = (torque - grid.torque_nm[j]) / (grid.torque_nm[j + 1] - grid.torque_nm[j])
-    result = np.zeros(speed.shape)
-    for corner, weight in (
-        (values[i, j], (1 - x) * (1 - y)),
-        (values[i, j + 1], (1 - x) * y),
-        (values[i + 1, j], x * (1 - y)),
-        (values[i + 1, j + 1], x * y),
-    ):
-        # A corner that was not measured spoils only what leans on it.
-        result += np.where(weight == 0, 0.0, weight * corner)
-    outside = (x < 0) | (x > 1) | (y < 0) | (y > 1)
-    return np.where(outside, np.nan, result)
+def _on_grid(grid: EngineGrid, values: Array, torque_nm: Array, speed_radps: Array) -> Array:
+    return interpolated(grid.speed_radps, grid.torque_nm, values, torque_nm, speed_radps)

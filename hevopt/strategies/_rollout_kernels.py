@@ -40,7 +40,13 @@ def reachable(first, power, step_s, allowed, low, high, end_min, battery):
             if bottom > top:
                 continue
             lowest, highest = np.inf, -np.inf
-            for i in range(first[k, n], first[k, n + 1]):
+            # The energy before a step grows with its power: what lies between two powers adds nothing.
+            least_w, most_w = np.inf, -np.inf
+            start, count = first[k, n], first[k, n + 1] - first[k, n]
+            for visit in range(count):
+                i = start + (count - visit) % count  # the first, the last, then inwards
+                if least_w <= power[i] <= most_w:
+                    continue
                 a = _energy_before(bottom, power[i], step_s[k], low, high, battery)
                 b = _energy_before(top, power[i], step_s[k], low, high, battery)
                 after_a = a - step_s[k] * chemical_power_at(power[i], a, battery)
@@ -48,6 +54,7 @@ def reachable(first, power, step_s, allowed, low, high, end_min, battery):
                 if after_a > top + slack or after_b < bottom - slack:
                     continue
                 lowest, highest = min(lowest, a), max(highest, b)
+                least_w, most_w = min(least_w, power[i]), max(most_w, power[i])
             for m in range(modes):
                 if allowed[m, n]:
                     least[k, m] = min(least[k, m], lowest)
