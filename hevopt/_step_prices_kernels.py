@@ -114,3 +114,32 @@ def linear_steps(first, power, step_s, energy, rollout_power, battery):
         for i in range(first[k, 0], first[k, -1]):
             drain[i] = step_s[k] * drain_and_slope(power[i], energy[k], battery)[0]
     return drain, keep
+
+
+@compiled()
+def lower_hull(step, drain, cost, order):
+    """(entry,) whether an entry is a corner of its step's lower hull of cost over drain, falling part.
+
+    order: entries sorted by step, then drain, then cost. Mixtures of corners cost no more than any other entry.
+    """
+    count = len(order)
+    stack = np.empty(count, dtype=np.int64)
+    kept = np.zeros(count, dtype=np.bool_)
+    bottom = top = 0
+    for place in range(count):
+        i = order[place]
+        if place == 0 or step[i] != step[order[place - 1]]:
+            bottom = top
+        if top > bottom and cost[i] >= cost[stack[top - 1]]:
+            continue
+        while top - bottom >= 2:
+            a, b = stack[top - 2], stack[top - 1]
+            if (cost[b] - cost[a]) * (drain[i] - drain[a]) < (cost[i] - cost[a]) * (
+                drain[b] - drain[a]
+            ):
+                break
+            top -= 1
+        stack[top] = i
+        top += 1
+    kept[stack[:top]] = True
+    return kept

@@ -73,6 +73,11 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
         choices.first, choices.power_w, choices.step_s, rollout.energy_j, rollout.battery_power_w,
         problem.battery.arrays,
     )  # fmt: skip
+    # Mixtures of the corners of a step's lower hull of cost over drain are as good as those of all its choices.
+    corner = kernels.lower_hull(
+        step, drain_j, choices.cost_kg, np.lexsort((choices.cost_kg, drain_j, step))
+    )
+    step, drain_j, cost_kg = step[corner], drain_j[corner], choices.cost_kg[corner]
     entries, steps = len(step), choices.steps
     low, high = problem.window_j
     # Columns: weight of every choice, then x_1 ... x_T. Energy may be thrown away: rows <=.
@@ -98,7 +103,7 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     bounds[entries:] = low / scale_j, high / scale_j
     bounds[-1, 0] = problem.end_min_j / scale_j
     result = linprog(
-        np.concatenate([choices.cost_kg, np.zeros(steps)]),
+        np.concatenate([cost_kg, np.zeros(steps)]),
         A_ub=energy_rows, b_ub=offset, A_eq=weight_rows, b_eq=ones, bounds=bounds, method="highs",
     )  # fmt: skip
     if result.status != 0:

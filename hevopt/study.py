@@ -1,7 +1,7 @@
 """The study: run strategies on architectures over one cycle, and collect a row for each."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
@@ -9,7 +9,7 @@ from typing import Any
 
 from hevopt.architecture import Architecture, load_architecture
 from hevopt.balance import Around
-from hevopt.certificate import SCOPE, Certificate, certify
+from hevopt.certificate import SCOPE, TARGET_GAP, Certificate, certify
 from hevopt.cycle import DISTANCE_MIN_M, Cycle, load_cycle
 from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
 from hevopt.files import shipped_names
@@ -87,6 +87,7 @@ class Case:
     problem: Problem
     certificate: Certificate
     dp_plan: Plan
+    dp_trajectory: Trajectory
     dp_s: float
 
 
@@ -224,7 +225,7 @@ def prepare(
     and certificate are then those of the table with the added levels.
     """
 
-    def solved(around: Around | None) -> tuple[Problem, Plan, Trajectory, float]:
+    def case_with(around: Around | None) -> Case:
         problem = build_problem(
             car,
             cycle,
@@ -233,34 +234,45 @@ def prepare(
             allow_shortfall=allow_shortfall,
             around=around,
         )
-        began = perf_counter()
-        plan = dp.solve(problem)
-        return problem, plan, simulate(problem, plan.control), perf_counter() - began
+        return dp_case(car, cycle, problem)
 
-    problem, plan, trajectory, dp_s = solved(None)
+    case = case_with(None)
     share = 0.5 / (levels - 1)
     for _ in range(_REFINEMENTS_MAX if refine else 0):
-        before_kg = trajectory.cost_kg
-        around = Around(torques_of(trajectory, problem.table), share)
-        problem, plan, trajectory, more_s = solved(around)
-        dp_s += more_s
-        if abs(trajectory.cost_kg - before_kg) < _REFINED_ENOUGH * before_kg:
+        before = case
+        around = Around(torques_of(case.dp_trajectory, case.problem.table), share)
+        case = case_with(around)
+        case = replace(case, dp_s=case.dp_s + before.dp_s)
+        moved_kg = abs(case.dp_trajectory.cost_kg - before.dp_trajectory.cost_kg)
+        if moved_kg < _REFINED_ENOUGH * before.dp_trajectory.cost_kg:
             break
         share /= 2
-    return Case(car, cycle, problem, certify(problem, trajectory), plan, dp_s)
+    return case
+
+
+def dp_case(
+    car: Architecture, cycle: Cycle, problem: Problem, target_gap: float = TARGET_GAP
+) -> Case:
+    """A problem of a car on a cycle, solved by dynamic programming and certified along its rollout."""
+    began = perf_counter()
+    plan = dp.solve(problem)
+    trajectory = simulate(problem, plan.control)
+    dp_s = perf_counter() - began
+    certificate = certify(problem, trajectory, target_gap=target_gap)
+    return Case(car, cycle, problem, certificate, plan, trajectory, dp_s)
 
 
 def run_case(
     case: Case, strategy: str, horizon_s: float | None = None
 ) -> tuple[Row, Plan, Trajectory]:
     """One strategy on a case: its row (no reference yet), plan and trajectory."""
-    plan, solve_s = case.dp_plan, case.dp_s
+    plan, trajectory, solve_s = case.dp_plan, case.dp_trajectory, case.dp_s
     if strategy != "dp":
         settings = _settings(case, strategy, horizon_s)
         began = perf_counter()
         plan = strategy_named(strategy).solve(case.problem, **settings)
         solve_s = perf_counter() - began
-    trajectory = simulate(case.problem, plan.control)
+        trajectory = simulate(case.problem, plan.control)
     row = _row(case, strategy, trajectory, solve_s)
     for name, value in row.as_dict().items():
         if isinstance(value, float) and not isfinite(value):

@@ -1,0 +1,78 @@
+"""What a worker makes of a job, and the keys that results are stored under."""
+
+import pytest
+
+from hevopt import load_architecture, load_cycle
+from hevopt.errors import SolverError
+from hevopt.study import Row, prepare, run_case
+from hevopt.sweeps.jobs import Case, Job, jobs_of
+from hevopt.sweeps.work import run_job
+
+CHANGES = {"battery.cells_in_series": 48, "machine.power_max_w": 14e3}
+
+
+def one_job(strategies=("ecms", "dp", "bound"), weights=(0.0, 10.0), **settings):
+    members = list(enumerate(weights))
+    ((job, planned),) = jobs_of("C2", ["nedc"], strategies, [(CHANGES, members)], **settings)
+    return job, planned
+
+
+def test_a_job_gives_the_rows_that_a_comparison_would():
+    outcomes = run_job(one_job()[0])
+    assert [o.status for o in outcomes] == ["ok"] * 6
+    case = prepare(load_architecture("C2", CHANGES), load_cycle("nedc"), nox_weight=10.0)
+    row, _, trajectory = run_case(case, "ecms")
+    stored = next(o.row for o in outcomes[3:] if o.row["strategy"] == "ecms")
+    assert {k: v for k, v in stored.items() if k in row.as_dict()} == {
+        k: v for k, v in row.as_dict().items() if k != "solve_s"
+    }
+    assert set(stored) == (set(Row.__dataclass_fields__) - {"solve_s"}) | {"objective_l_per_100km"}
+    # By hand: weighted cost less the worth of what the charge has gained, as a volume.
+    gained_j = trajectory.end_j - case.problem.start_j
+    cost_kg = trajectory.total_fuel_kg + 10 * trajectory.total_nox_kg
+    corrected_kg = cost_kg - case.certificate.price_kgpj * gained_j
+    litres = corrected_kg / 0.835 / case.cycle.distance_m * 1e5
+    assert stored["objective_l_per_100km"] == pytest.approx(litres, rel=1e-12)
+
+
+def test_no_objective_lies_below_the_bound_that_pruning_uses():
+    outcomes = run_job(one_job(("bound", "ecms", "dp", "conventional"))[0])
+    for rows in (outcomes[:4], outcomes[4:]):
+        bound = rows[0].row["bound_l_per_100km"]
+        objectives = [o.row["objective_l_per_100km"] for o in rows[1:]]
+        assert rows[0].row["fuel_l_per_100km"] is None
+        assert bound <= min(objectives) < 1.01 * bound
+
+
+def test_a_key_says_everything_that_can_change_a_result_and_nothing_else():
+    _, planned = one_job()
+    keys = {p.key for p in planned}
+    assert len(keys) == len(planned) == 6
+    assert keys == {p.key for p in one_job()[1]}
+    assert not keys & {p.key for p in one_job(allow_shortfall=True)[1]}
+    other = next(jobs_of("C2", ["udds"], ["dp"], [(CHANGES, [(0, 0.0)])]))[1]
+    written = dict(CHANGES, hybrid_mass_kg=70.0)  # the file's own value, given once more
+    same = next(jobs_of("C2", ["nedc"], ["dp"], [(written, [(7, 0)])]))[1]
+    assert other[0].key not in keys and same[0].key in keys
+
+
+def test_an_exception_is_an_outcome_and_the_other_cases_go_on():
+    job, _ = one_job(("dp", "baseline"), (0.0,))
+    impossible = Job(job.architecture, job.changes, "us06", False, job.cases)
+    broken = Job(job.architecture, {"machine.power_max_w": -1}, "nedc", False, job.cases)
+
+    class Guard:
+        def __enter__(self):
+            raise SolverError("not today")
+
+        def __exit__(self, *_):
+            return False
+
+    assert {o.status for o in run_job(job)} == {"ok"}
+    guarded = run_job(job, Guard)
+    assert [(o.status, o.error) for o in guarded] == [("failed", "not today")] * 2
+    assert [o.status for o in run_job(broken)] == ["failed"] * 2
+    weak = Job("A", {}, "us06", False, (Case("k", 0.0, "baseline"),))
+    (outcome,) = run_job(weak)
+    assert outcome.status == "infeasible" and "Nm missing" in outcome.error
+    assert {o.status for o in run_job(impossible)} <= {"ok", "infeasible", "failed"}
