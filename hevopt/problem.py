@@ -31,6 +31,7 @@ class Reject(IntFlag):
     FUNCTION = 128
     DUPLICATE = 256
     GIVEN = 512
+    MACHINE_MAP = 1024
 
 
 REJECT_WORDS: dict[Reject, str] = {
@@ -44,6 +45,7 @@ REJECT_WORDS: dict[Reject, str] = {
     Reject.FUNCTION: "function not in the architecture",
     Reject.DUPLICATE: "same as another control",
     Reject.GIVEN: "marked as not feasible",
+    Reject.MACHINE_MAP: "outside the machine map",
 }
 
 
@@ -201,6 +203,8 @@ class Problem:
     soc_end_min: state of charge that must at least be left at the end
     start_mode: mode before the first step
     nox_weight: kg of fuel that a kg of NOx counts
+    cost_kg: (time, control) what a step counts: fuel plus weighted NOx
+    start_j, end_min_j, window_j: stored energy before the first step, least at the end, at the window's ends
     A control whose power the battery cannot deliver or take at every state of charge of its window is rejected.
     """
 
@@ -210,6 +214,10 @@ class Problem:
     soc_end_min: float
     start_mode: int = 0
     nox_weight: float = 0.0
+    cost_kg: Array = field(init=False)
+    start_j: float = field(init=False)
+    end_min_j: float = field(init=False)
+    window_j: tuple[float, float] = field(init=False)
 
     def __post_init__(self) -> None:
         low, high = self.battery.soc_min, self.battery.soc_max
@@ -230,29 +238,21 @@ class Problem:
             bits = np.where(beyond, np.uint16(Reject.BATTERY_LIMIT), np.uint16(0))
             table = replace(self.table, reject=self.table.reject | bits)
             object.__setattr__(self, "table", table)
+        self._derive()
 
-    @property
-    def cost_kg(self) -> Array:
-        """(time, control) what a step counts: fuel plus weighted NOx."""
-        if self.nox_weight == 0:
-            return self.table.fuel_kg
-        return self.table.fuel_kg + self.nox_weight * self.table.nox_kg
-
-    @property
-    def start_j(self) -> float:
-        """Stored energy before the first step."""
-        return float(energy_j(self.battery, self.soc_start))
-
-    @property
-    def end_min_j(self) -> float:
-        """Stored energy that must at least be left."""
-        return float(energy_j(self.battery, self.soc_end_min))
-
-    @property
-    def window_j(self) -> tuple[float, float]:
-        """Stored energy at the ends of the SOC window."""
-        low, high = energy_j(self.battery, np.array([self.battery.soc_min, self.battery.soc_max]))
-        return float(low), float(high)
+    def _derive(self) -> None:
+        cost_kg = self.table.fuel_kg
+        if self.nox_weight != 0:
+            cost_kg = cost_kg + self.nox_weight * self.table.nox_kg
+            cost_kg.flags.writeable = False
+        socs = np.array(
+            [self.soc_start, self.soc_end_min, self.battery.soc_min, self.battery.soc_max]
+        )
+        start, end, low, high = map(float, energy_j(self.battery, socs))
+        for name, value in (
+            ("cost_kg", cost_kg), ("start_j", start), ("end_min_j", end), ("window_j", (low, high)),
+        ):  # fmt: skip
+            object.__setattr__(self, name, value)
 
     def with_nox_weight(self, nox_weight: float) -> "Problem":
         """The same problem with another objective."""
