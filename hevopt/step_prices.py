@@ -63,7 +63,11 @@ def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[L
 
 
 def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
-    """(time,) multipliers of the energy steps: minimise cost over mixtures of controls, x in the window."""
+    """(time,) multipliers of the energy steps: minimise cost over mixtures of controls, x in the window.
+
+    The mixtures of a step cost the lower hull of its controls' cost over drain; from the corner of least drain
+    the hull falls segment by segment, ever less steeply, so that segments bounded by 0 and 1 are all it needs.
+    """
     from scipy.optimize import linprog
     from scipy.sparse import csr_array
 
@@ -73,38 +77,36 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
         choices.first, choices.power_w, choices.step_s, rollout.energy_j, rollout.battery_power_w,
         problem.battery.arrays,
     )  # fmt: skip
-    # Mixtures of the corners of a step's lower hull of cost over drain are as good as those of all its choices.
-    corner = kernels.lower_hull(
-        step, drain_j, choices.cost_kg, np.lexsort((choices.cost_kg, drain_j, step))
-    )
+    order = np.lexsort((choices.cost_kg, drain_j, step))
+    corner = order[kernels.lower_hull(step, drain_j, choices.cost_kg, order)[order]]
     step, drain_j, cost_kg = step[corner], drain_j[corner], choices.cost_kg[corner]
-    entries, steps = len(step), choices.steps
+    inside = step[1:] == step[:-1]
+    least_j = drain_j[np.append(True, ~inside)]
+    segment_step = step[1:][inside]
+    segments, steps = len(segment_step), choices.steps
     low, high = problem.window_j
-    # Columns: weight of every choice, then x_1 ... x_T. Energy may be thrown away: rows <=.
-    ones, scale_j = np.ones(steps), high - low
-    following, present = entries + np.arange(steps), entries + np.arange(steps - 1)
-    energy_rows = csr_array(
+    # Columns: share of every segment, then x_1 ... x_T. Energy may be thrown away: rows <=.
+    scale_j = high - low
+    following, present = segments + np.arange(steps), segments + np.arange(steps - 1)
+    rows = csr_array(
         (
-            np.concatenate([drain_j / scale_j, ones, -keep_j[1:]]),
+            np.concatenate([np.diff(drain_j)[inside] / scale_j, np.ones(steps), -keep_j[1:]]),
             (
-                np.concatenate([step, np.arange(steps), np.arange(1, steps)]),
-                np.concatenate([np.arange(entries), following, present]),
+                np.concatenate([segment_step, np.arange(steps), np.arange(1, steps)]),
+                np.concatenate([np.arange(segments), following, present]),
             ),
         ),
-        shape=(steps, entries + steps),
+        shape=(steps, segments + steps),
     )
-    weight_rows = csr_array(
-        (np.ones(entries), (step, np.arange(entries))), shape=(steps, entries + steps)
-    )
-    offset = (1.0 - keep_j) * rollout.energy_j[:-1] / scale_j
+    offset = ((1.0 - keep_j) * rollout.energy_j[:-1] - least_j) / scale_j
     offset[0] += keep_j[0] * problem.start_j / scale_j
-    bounds = np.empty((entries + steps, 2))
-    bounds[:entries] = 0.0, np.inf
-    bounds[entries:] = low / scale_j, high / scale_j
+    bounds = np.empty((segments + steps, 2))
+    bounds[:segments] = 0.0, 1.0
+    bounds[segments:] = low / scale_j, high / scale_j
     bounds[-1, 0] = problem.end_min_j / scale_j
     result = linprog(
-        np.concatenate([cost_kg, np.zeros(steps)]),
-        A_ub=energy_rows, b_ub=offset, A_eq=weight_rows, b_eq=ones, bounds=bounds, method="highs",
+        np.concatenate([np.diff(cost_kg)[inside], np.zeros(steps)]),
+        A_ub=rows, b_ub=offset, bounds=bounds, method="highs",
     )  # fmt: skip
     if result.status != 0:
         raise SolverError(f"HiGHS stopped with status {result.status}: {result.message}")
