@@ -4,11 +4,11 @@ An architecture names its components; a name is looked for in `components/` besi
 shipped ones, and a path is relative to the file. Any key of either can be changed on reading, by its path.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from hevopt.architecture_files import (
     EngineFile,
     GearboxFile,
     LinearVoltageFile,
+    LossMapFile,
     MachineFile,
 )
 from hevopt.battery import Battery
@@ -29,7 +30,8 @@ from hevopt.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
 from hevopt.errors import DataError
 from hevopt.files import find, is_path, printable, shipped_folder, shown
 from hevopt.keypaths import merged, with_changes
-from hevopt.machine import Machine
+from hevopt.machine import LossGrid, Machine
+from hevopt.scaling import scaled_engine, scaled_machine
 from hevopt.transmission import Gearbox
 from hevopt.units import STANDARD_GRAVITY_MPS2, TO_SI
 from hevopt.vehicle import Vehicle
@@ -99,19 +101,18 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     path = find("architectures", name, ".toml")
     own, of_parts = _sorted_changes(changes or {})
     contents = with_changes(read_contents(path), own)
-    data = checked(_place(path, own), contents, ArchitectureFile)
+    data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
 
     def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built:
-        found, table = _component_table(path, key, getattr(data, key), of_parts[key])
-        contents[key] = table
-        files.append(found)
-        place = _place(found, {f"{key}.{name}": 0 for name in of_parts[key]})
-        file = checked(place, table, model)
+        found = component_contents(path, key, getattr(data, key), of_parts[key])
+        contents[key] = found.contents
+        files.append(found.file)
+        file = checked(found.place, found.contents, model)
         try:
             return build(file)
         except DataError as error:
-            raise DataError(f"{place}: {error}") from None
+            raise DataError(f"{found.place}: {error}") from None
 
     battery, soc = part("battery", BatteryFile, lambda file: (_battery(file), file.soc))
     gearbox = part("gearbox", GearboxFile, _gearbox)
@@ -154,9 +155,17 @@ def _sorted_changes(
     return own, of_parts
 
 
-def _component_table(
+class ComponentContents(NamedTuple):
+    """A component as an architecture has it: its file, its keys and values, and how a message names the two."""
+
+    file: Path
+    contents: dict[str, Any]
+    place: str
+
+
+def component_contents(
     path: Path, key: str, component: str | dict[str, Any], changes: Mapping[str, Any]
-) -> tuple[Path, dict[str, Any]]:
+) -> ComponentContents:
     """The file that an architecture's key names, and its contents with what replaces them."""
     name = component if isinstance(component, str) else component["file"]
     beside = path.parent if is_path(name, ".toml") else path.parent / "components"
@@ -165,15 +174,19 @@ def _component_table(
         found = find("architectures/components", name, ".toml", beside=folder)
     except DataError as error:
         raise DataError(f"{path}, {key}: {error}") from None
-    table = read_contents(found)
-    if isinstance(component, dict):
-        table = merged(table, {k: value for k, value in component.items() if k != "file"})
-    return found, with_changes(table, changes)
+    table, place = read_contents(found), str(found)
+    own = {} if isinstance(component, str) else {k: v for k, v in component.items() if k != "file"}
+    if own:
+        table = merged(table, own)
+        place = f"{_place(place, [f'{key}.{name}' for name in own])} in {path}"
+    place = _place(place, [f"{key}.{name}" for name in changes])
+    return ComponentContents(found, with_changes(table, changes, within=f"{key}."), place)
 
 
-def _place(path: Path, changes: Mapping[str, Any]) -> str:
+def _place(place: str, changes: Iterable[str]) -> str:
     """How a message names a file, and what was changed in it."""
-    return f"{path}, with {', '.join(map(printable, changes))} changed" if changes else str(path)
+    changed = ", ".join(map(printable, changes))
+    return f"{place}, with {changed} changed" if changed else place
 
 
 def _coupling(data: CouplingFile) -> Coupling:
@@ -233,7 +246,7 @@ def _engine(data: EngineFile) -> Engine:
     else:
         fuel = FuelCoefficients(**data.fuel_coefficients.model_dump())
     nox = data.nox_coefficients
-    return Engine(
+    engine = Engine(
         name=data.name,
         displacement_m3=data.displacement_cm3 * TO_SI["_cm3"][1],
         stroke_m=data.stroke_mm * TO_SI["_mm"][1],
@@ -248,6 +261,7 @@ def _engine(data: EngineFile) -> Engine:
         fuel=fuel,
         nox=None if nox is None else NoxCoefficients(**nox.model_dump()),
     )
+    return engine if data.scale is None else scaled_engine(engine, data.scale.factor)
 
 
 def _gearbox(data: GearboxFile) -> Gearbox:
@@ -267,15 +281,27 @@ def _gearbox(data: GearboxFile) -> Gearbox:
 
 def _machine(data: MachineFile) -> Machine:
     loss = (data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
-    return Machine(
+    if data.loss_map is not None:
+        loss = _loss_grid(data.loss_map)
+    machine = Machine(
         data.name,
         data.power_max_w,
         data.torque_max_nm or inf,
         (data.speed_max_rpm or inf) * TO_SI["_rpm"][1],
         data.inertia_kgm2,
-        loss if data.kind == "loss" else None,
+        None if data.kind == "efficiency" else loss,
         data.efficiency,
     )
+    return machine if data.scale is None else scaled_machine(machine, data.scale.factor)
+
+
+def _loss_grid(data: LossMapFile) -> LossGrid:
+    torque, loss = np.array(data.torque_nm), np.array(data.loss_w)
+    if data.symmetric:
+        above = torque > 0
+        torque = np.concatenate([-torque[above][::-1], torque])
+        loss = np.hstack([loss[:, above][:, ::-1], loss])
+    return LossGrid(np.array(data.speed_rpm) * TO_SI["_rpm"][1], torque, loss)
 
 
 def _battery(data: BatteryFile) -> Battery:

@@ -39,6 +39,11 @@ Curve = Annotated[list[Coefficient], Field(min_length=2, max_length=10_000)]
 Speeds = Annotated[
     list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=2, max_length=10_000)
 ]
+Mass = Annotated[float, Field(ge=50, le=100_000)]
+AuxiliaryPower = Annotated[float, Field(ge=0, le=50_000)]
+StartFuel = Annotated[float, Field(ge=0, le=100)]
+ShiftFuel = Annotated[float, Field(ge=0, le=10)]
+ScaleFactor = Annotated[float, Field(ge=0.05, le=20)]
 Ohm = Annotated[Annotated[NotNegative, Number] | Annotated[list[NotNegative], List], Shape]
 _MAP_MAX = 1e6
 # exp() of more than this overflows.
@@ -132,10 +137,10 @@ class CarFile(FileModel):
     """A car without powertrain."""
 
     name: Name
-    mass_kg: Annotated[float, Field(ge=50, le=100_000)]
+    mass_kg: Mass
     tyre_radius_m: Annotated[float, Field(ge=0.1, le=1.5)]
     wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
-    auxiliary_power_w: Annotated[float, Field(ge=0, le=50_000)]
+    auxiliary_power_w: AuxiliaryPower
     road_load: RoadLoadFile
 
 
@@ -178,6 +183,16 @@ class NoxCoefficientsFile(FileModel):
     dp: Annotated[float, Field(ge=0.01, le=1e6)]
 
 
+def _check_grid(name: str, grid: list[list[float]], rows: int, columns: int) -> None:
+    if len(grid) != rows or any(len(row) != columns for row in grid):
+        raise ValueError(f"{name} must have {rows} rows of {columns} values")
+    values = np.array(grid)
+    if np.isnan(values).all():
+        raise ValueError(f"{name} holds nan only; give the measured values")
+    if not (np.isnan(values) | ((values >= 0) & (values <= _MAP_MAX))).all():
+        raise ValueError(f"{name}: allowed: 0 to {_MAP_MAX:g}, or nan where not measured")
+
+
 class EngineGridFile(FileModel):
     """A measured map: rows are speeds, columns torques; nan marks a cell that was not measured."""
 
@@ -192,20 +207,40 @@ class EngineGridFile(FileModel):
         shape = (len(self.speed_rpm), len(self.torque_nm))
         for name in ("fuel_gps", "nox_gps"):
             grid = getattr(self, name)
-            if grid is None:
-                continue
-            if len(grid) != shape[0] or any(len(row) != shape[1] for row in grid):
-                raise ValueError(f"{name} must have {shape[0]} rows of {shape[1]} values")
-            values = np.array(grid)
-            if np.isnan(values).all():
-                raise ValueError(f"{name} holds nan only; give the measured values")
-            if not (np.isnan(values) | ((values >= 0) & (values <= _MAP_MAX))).all():
-                raise ValueError(f"{name}: allowed: 0 to {_MAP_MAX:g}, or nan where not measured")
+            if grid is not None:
+                _check_grid(name, grid, *shape)
         if len(self.motoring_torque_nm) != shape[0] or max(self.motoring_torque_nm) >= 0:
             raise ValueError(f"motoring_torque_nm must be {shape[0]} values below 0")
         if (np.diff(self.speed_rpm) <= 0).any() or (np.diff(self.torque_nm) <= 0).any():
             raise ValueError("speed_rpm and torque_nm must increase")
         return self
+
+
+class ScaleFile(FileModel):
+    """Another size of the same design: one factor, called by any of its names; the law is in scaling.py."""
+
+    torque: ScaleFactor | None = None
+    power: ScaleFactor | None = None
+
+    @model_validator(mode="after")
+    def _one_name(self):
+        given = sorted(self.model_fields_set)
+        if len(given) != 1:
+            names = ", ".join(type(self).model_fields)
+            raise ValueError(
+                f"give exactly one of {names}: speeds stay, so that they are one factor; "
+                f"found: {', '.join(given) or 'none'}"
+            )
+        return self
+
+    @property
+    def factor(self) -> float:
+        """The factor given."""
+        return next(value for value in self.model_dump().values() if value is not None)
+
+
+class EngineScaleFile(ScaleFile):
+    displacement: ScaleFactor | None = None
 
 
 class EngineFile(FileModel):
@@ -215,12 +250,13 @@ class EngineFile(FileModel):
     stroke_mm: Annotated[float, Field(ge=10, le=1000)]
     idle_rpm: Annotated[float, Field(ge=50, le=5000)]
     inertia_kgm2: Annotated[float, Field(ge=0, le=100)]
-    start_fuel_g: Annotated[float, Field(ge=0, le=100)]
+    start_fuel_g: StartFuel
     fuel: FuelFile
     full_load: FullLoadFile
     fuel_coefficients: FuelCoefficientsFile | None = None
     fuel_map: EngineGridFile | None = None
     nox_coefficients: NoxCoefficientsFile | None = None
+    scale: EngineScaleFile | None = None
 
     @model_validator(mode="after")
     def _one_map(self):
@@ -281,7 +317,7 @@ class ShiftSpeedsFile(FileModel):
 class FreeGearFile(FileModel):
     """What limits a gear that the strategy chooses."""
 
-    shift_fuel_g: Annotated[float, Field(ge=0, le=10)]
+    shift_fuel_g: ShiftFuel
     engine_speed_min_rpm: Annotated[float, Field(ge=0, le=10_000)]
 
 
@@ -300,18 +336,51 @@ class GearboxFile(FileModel):
             raise ValueError(f"efficiency needs one value or {gears}, one per gear")
         if len(shifts.up_kmh) != gears - 1 or len(shifts.down_kmh) != gears - 1:
             raise ValueError(f"shift_speeds need {gears - 1} values each for {gears} gears")
+        return self
+
+    @model_validator(mode="after")
+    def _falling(self):
         if list(self.ratios) != sorted(self.ratios, reverse=True):
             raise ValueError("ratios must fall from first gear to last")
-        if any(d >= u for u, d in zip(shifts.up_kmh, shifts.down_kmh, strict=True)):
+        return self
+
+    @model_validator(mode="after")
+    def _no_hunting(self):
+        shifts = self.shift_speeds
+        if any(d >= u for u, d in zip(shifts.up_kmh, shifts.down_kmh, strict=False)):
             raise ValueError("each down_kmh must be below its up_kmh")
         if sorted(shifts.up_kmh) != shifts.up_kmh or sorted(shifts.down_kmh) != shifts.down_kmh:
             raise ValueError("shift speeds must rise from gear to gear")
         return self
 
 
+class LossMapFile(FileModel):
+    """A measured map: rows are speeds, columns torques; nan marks a cell that was not measured.
+
+    symmetric: torque_nm holds values from 0 up, and the loss is the same at the opposite torque.
+    """
+
+    speed_rpm: Speeds
+    torque_nm: Curve
+    loss_w: list[list[Annotated[float, Field(allow_inf_nan=True)]]]
+    symmetric: bool = False
+
+    @model_validator(mode="after")
+    def _shapes(self):
+        _check_grid("loss_w", self.loss_w, len(self.speed_rpm), len(self.torque_nm))
+        if (np.diff(self.speed_rpm) <= 0).any() or (np.diff(self.torque_nm) <= 0).any():
+            raise ValueError("speed_rpm and torque_nm must increase")
+        if self.symmetric and self.torque_nm[0] < 0:
+            raise ValueError(
+                f"symmetric needs torque_nm from 0 up, found {self.torque_nm[0]:g}; with torques of "
+                "both signs leave symmetric out"
+            )
+        return self
+
+
 class MachineFile(FileModel):
     name: Name
-    kind: Literal["loss", "efficiency"]
+    kind: Literal["loss", "efficiency", "map"]
     power_max_w: Positive
     torque_max_nm: Positive | None = None
     speed_max_rpm: Positive | None = None
@@ -321,6 +390,8 @@ class MachineFile(FileModel):
     loss_c1_ws: NotNegative | None = None
     loss_c2_ws2: NotNegative | None = None
     loss_c3_wpnm2: NotNegative | None = None
+    loss_map: LossMapFile | None = None
+    scale: ScaleFile | None = None
 
     @model_validator(mode="after")
     def _keys_of_kind(self):
@@ -331,6 +402,12 @@ class MachineFile(FileModel):
             )
         if self.kind == "efficiency" and (self.efficiency is None or any(losses)):
             raise ValueError("kind 'efficiency' needs efficiency and no loss_c*")
+        if self.kind == "map" and (
+            any(v is not None for v in losses) or self.efficiency is not None
+        ):
+            raise ValueError("kind 'map' needs the table [loss_map], and no efficiency or loss_c*")
+        if (self.kind == "map") != (self.loss_map is not None):
+            raise ValueError("the table [loss_map] goes with kind 'map'")
         return self
 
 

@@ -7,6 +7,7 @@ Lines that begin with # are comments.
 
 import csv
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -19,17 +20,19 @@ from hevopt.files import find, printable, read_text, shown
 from hevopt.units import TO_SI
 
 _SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
-_COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
+COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
 _MEGABYTES_MAX = 50
-_SAMPLES_MAX = 200_000
+SAMPLES_MAX = 200_000
 _TIME_MAX_S = 1e9
-_SPEED_MAX_MPS = 100.0
-_GRADE_MAX = 0.5
+SPEED_MAX_MPS = 100.0
+GRADE_MAX = 0.5
 _STEP_MIN_S, _STEP_MAX_S = 1e-4, 3600.0
 # Twice the friction limit of a dry road: nothing on tyres does more.
 _ACCELERATION_MAX_MPS2 = 20.0
 # Figures per distance say nothing below this.
 DISTANCE_MIN_M = 1.0
+# Called with every fault found: line and text.
+_Tell = Callable[[int, str], None]
 # Plainer than Python's own: no underscores, no digits of other scripts.
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -73,20 +76,48 @@ class Cycle:
 def load_cycle(name: str | Path) -> Cycle:
     """The cycle of a shipped name (`nedc`) or a CSV file's path; DataError names line and value."""
     path = find("cycles", name, ".csv")
-    header, rows = _rows(path, read_text(path, _MEGABYTES_MAX))
+    return cycle_of(path, read_text(path, _MEGABYTES_MAX))
+
+
+def cycle_of(path: Path, text: str) -> Cycle:
+    """The cycle that the text of a cycle file holds; the path gives its name and stands in messages."""
+
+    def refuse(line: int, fault: str) -> None:
+        raise DataError(f"{path}, line {line}: {fault}")
+
+    return _cycle(path, text, refuse)
+
+
+def faults_in(path: Path) -> list[str]:
+    """`line 12: ...` for every faulty line of a cycle file, or else what is wrong with the whole of it."""
+    faults: list[tuple[int, str]] = []
+    text = read_text(path, _MEGABYTES_MAX)
+    try:
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # numbers out of range are among the faults
+            _cycle(path, text, lambda *fault: faults.append(fault))
+    except DataError as error:
+        if not faults:
+            return [str(error).removeprefix(f"{path}, ").removeprefix(f"{path}: ")]
+    return [f"line {line}: {fault}" for line, fault in sorted(faults)]
+
+
+def _cycle(path: Path, text: str, tell: _Tell) -> Cycle:
+    header, rows = _rows(path, text, tell)
     columns = {name: np.array([row[i] for _, row in rows]) for i, name in enumerate(header)}
     lines = [line for line, _ in rows]
     speed_column = next(c for c in _SPEED_COLUMNS if c in columns)
     factor = TO_SI.get(speed_column.removeprefix("speed"), ("", 1.0))[1]
     speed_mps = columns[speed_column] * factor
     grade = columns.get("grade", np.zeros(len(rows)))
-    _check_time_and_speed(path, lines, columns["time_s"], speed_mps, speed_column, factor)
-    _check_range(path, lines, "grade", grade, -_GRADE_MAX, _GRADE_MAX)
+    _check_time_and_speed(lines, columns["time_s"], speed_mps, speed_column, factor, tell)
+    _check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell)
     gear = clutch_open = None
     if "gear" in columns:
-        gear = _whole_numbers(path, lines, "gear", columns["gear"], 20)
+        gear = _whole_numbers(lines, "gear", columns["gear"], 20, tell)
         clutch = columns.get("clutch_open", np.zeros(len(rows)))
-        clutch_open = _whole_numbers(path, lines, "clutch_open", clutch, 1).astype(bool)
+        clutch_open = _whole_numbers(lines, "clutch_open", clutch, 1, tell).astype(bool)
     cycle = Cycle(
         printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open, path
     )
@@ -98,8 +129,8 @@ def load_cycle(name: str | Path) -> Cycle:
     return cycle
 
 
-def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]]]]:
-    """Header names and the numbers of every data line, with its line number."""
+def _rows(path: Path, text: str, tell: _Tell) -> tuple[list[str], list[tuple[int, list[float]]]]:
+    """Header names and the numbers of every good data line, with its line number."""
     header: list[str] | None = None
     rows: list[tuple[int, list[float]]] = []
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
@@ -108,20 +139,24 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]
         try:
             cells = [cell.strip() for cell in next(csv.reader([line], strict=True))]
         except csv.Error as error:
-            raise DataError(f"{path}, line {number}: not a CSV line ({error})") from None
+            tell(number, f"not a CSV line ({error})")
+            continue
         if header is None:
             header = _checked_header(path, number, cells)
             continue
         if len(cells) != len(header):
-            raise DataError(
-                f"{path}, line {number}: {len(cells)} values, the header has {len(header)}"
+            tell(number, f"{len(cells)} values, the header has {len(header)}")
+            continue
+        if len(rows) == SAMPLES_MAX:
+            tell(
+                number,
+                f"more than the {SAMPLES_MAX} data lines allowed; shorten the cycle or use longer time "
+                "steps",
             )
-        if len(rows) == _SAMPLES_MAX:
-            raise DataError(
-                f"{path}, line {number}: more than the {_SAMPLES_MAX} data lines allowed; shorten "
-                "the cycle or use longer time steps"
-            )
-        rows.append((number, [_number(path, number, *pair) for pair in zip(header, cells)]))  # noqa: B905
+            break
+        values = [_number(number, *pair, tell) for pair in zip(header, cells, strict=True)]
+        if None not in values:
+            rows.append((number, values))
     if header is None:
         raise DataError(f"{path}: empty; expected a header line such as time_s,speed_kmh")
     if len(rows) < 2:
@@ -130,13 +165,13 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[float]
 
 
 def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
-    unknown = [cell for cell in cells if cell not in _COLUMNS]
+    unknown = [cell for cell in cells if cell not in COLUMNS]
     if unknown:
-        close = get_close_matches(unknown[0].lower(), _COLUMNS, n=2, cutoff=0.7)
+        close = get_close_matches(unknown[0].lower(), COLUMNS, n=2, cutoff=0.7)
         hint = f"close matches: {', '.join(close)}; " if close else ""
         raise DataError(
             f"{path}, line {number}: unknown column {shown(unknown[0])}; {hint}"
-            f"allowed: {', '.join(_COLUMNS)}"
+            f"allowed: {', '.join(COLUMNS)}"
         )
     if len(set(cells)) != len(cells):
         twice = next(cell for cell in cells if cells.count(cell) > 1)
@@ -152,66 +187,61 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
     return cells
 
 
-def _number(path: Path, line: int, column: str, cell: str) -> float:
+def _number(line: int, column: str, cell: str, tell: _Tell) -> float | None:
     if not _NUMBER.fullmatch(cell):
-        raise DataError(
-            f"{path}, line {line}: {column} is {shown(cell)}, not a number; a finite number such "
-            "as 12.5 is needed"
+        tell(
+            line,
+            f"{column} is {shown(cell)}, not a number; a finite number such as 12.5 is needed",
         )
+        return None
     value = float(cell)
     if not np.isfinite(value):
-        raise DataError(
-            f"{path}, line {line}: {column} is {shown(cell)}; a finite number is needed"
-        )
+        tell(line, f"{column} is {shown(cell)}; a finite number is needed")
+        return None
     return value
 
 
-def _check_time_and_speed(path, lines, time_s, speed_mps, column, factor) -> None:
-    _check_range(path, lines, "time_s", time_s, -_TIME_MAX_S, _TIME_MAX_S)
+def _check_time_and_speed(lines, time_s, speed_mps, column, factor, tell: _Tell) -> None:
+    _check_range(lines, "time_s", time_s, -_TIME_MAX_S, _TIME_MAX_S, tell)
     steps_s = np.diff(time_s)
-    if (steps_s <= 0).any():
-        k = int(np.argmax(steps_s <= 0)) + 1
-        raise DataError(
-            f"{path}, line {lines[k]}: time {time_s[k]:g} s after {time_s[k - 1]:g} s; "
-            "time must increase from line to line; sort the lines or remove the duplicate"
+    for k in np.flatnonzero(steps_s <= 0) + 1:
+        tell(
+            lines[k],
+            f"time {time_s[k]:g} s after {time_s[k - 1]:g} s; time must increase from line to line; "
+            "sort the lines or remove the duplicate",
         )
-    outside = (steps_s < _STEP_MIN_S) | (steps_s > _STEP_MAX_S)
-    if outside.any():
-        k = int(np.argmax(outside)) + 1
-        raise DataError(
-            f"{path}, line {lines[k]}: {steps_s[k - 1]:g} s after the line before; allowed: "
-            f"{_STEP_MIN_S:g} to {_STEP_MAX_S:g} s; time is in seconds"
+    for k in (
+        np.flatnonzero((steps_s > 0) & ((steps_s < _STEP_MIN_S) | (steps_s > _STEP_MAX_S))) + 1
+    ):
+        tell(
+            lines[k],
+            f"{steps_s[k - 1]:g} s after the line before; allowed: {_STEP_MIN_S:g} to {_STEP_MAX_S:g} s; "
+            "time is in seconds",
         )
-    if (speed_mps < 0).any() or (speed_mps > _SPEED_MAX_MPS).any():
-        k = int(np.argmax((speed_mps < 0) | (speed_mps > _SPEED_MAX_MPS)))
-        raise DataError(
-            f"{path}, line {lines[k]}: {column} is {speed_mps[k] / factor:g}; allowed: 0 to "
-            f"{_SPEED_MAX_MPS / factor:g}; check the unit in the column's name"
+    outside = (speed_mps < 0) | (speed_mps > SPEED_MAX_MPS)
+    for k in np.flatnonzero(outside):
+        tell(
+            lines[k],
+            f"{column} is {speed_mps[k] / factor:g}; allowed: 0 to {SPEED_MAX_MPS / factor:g}; check the "
+            "unit in the column's name",
         )
-    acceleration = np.diff(speed_mps) / steps_s
-    if (np.abs(acceleration) > _ACCELERATION_MAX_MPS2).any():
-        k = int(np.argmax(np.abs(acceleration) > _ACCELERATION_MAX_MPS2)) + 1
-        raise DataError(
-            f"{path}, line {lines[k]}: acceleration {acceleration[k - 1]:.3g} m/s²; allowed: "
-            f"±{_ACCELERATION_MAX_MPS2:g} m/s², more than tyres hold; check the units of time and "
-            "speed, or repair the spike"
-        )
-
-
-def _check_range(path, lines, column, values, low, high) -> None:
-    outside = (values < low) | (values > high)
-    if outside.any():
-        k = int(np.argmax(outside))
-        raise DataError(
-            f"{path}, line {lines[k]}: {column} is {values[k]:g}; allowed: {low:g} to {high:g}"
+    judged = (steps_s > 0) & ~outside[1:] & ~outside[:-1]
+    acceleration = np.diff(speed_mps) / np.where(judged, steps_s, 1.0)
+    for k in np.flatnonzero(judged & (np.abs(acceleration) > _ACCELERATION_MAX_MPS2)) + 1:
+        tell(
+            lines[k],
+            f"acceleration {acceleration[k - 1]:.3g} m/s²; allowed: ±{_ACCELERATION_MAX_MPS2:g} m/s², more "
+            "than tyres hold; check the units of time and speed, or repair the spike",
         )
 
 
-def _whole_numbers(path, lines, column, values, high) -> NDArray[np.int64]:
-    _check_range(path, lines, column, values, 0, high)
-    if (values != np.round(values)).any():
-        k = int(np.argmax(values != np.round(values)))
-        raise DataError(
-            f"{path}, line {lines[k]}: {column} is {values[k]:g}; a whole number is needed"
-        )
-    return values.astype(np.int64)
+def _check_range(lines, column, values, low, high, tell: _Tell) -> None:
+    for k in np.flatnonzero((values < low) | (values > high)):
+        tell(lines[k], f"{column} is {values[k]:g}; allowed: {low:g} to {high:g}")
+
+
+def _whole_numbers(lines, column, values, high, tell: _Tell) -> NDArray[np.int64]:
+    _check_range(lines, column, values, 0, high, tell)
+    for k in np.flatnonzero(values != np.round(values)):
+        tell(lines[k], f"{column} is {values[k]:g}; a whole number is needed")
+    return np.clip(np.round(values), 0, high).astype(np.int64)

@@ -1,12 +1,13 @@
 """Reading a TOML data file through a pydantic model: every fault at once, with file, key, value and range."""
 
+import re
 import tomllib
 from collections.abc import Iterator
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic.fields import FieldInfo
 
 from hevopt.errors import DataError
@@ -14,6 +15,12 @@ from hevopt.files import printable, read_text, shown
 
 _MEGABYTES_MAX = 5
 _FAULTS_LISTED = 20
+_DEPTH_MAX, _KEYS_MAX = 20, 5000
+# Ten or more parts joined by dots: reading thousands of them takes the memory of the machine.
+_PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY_PATH = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{9}}")
+# Signs of a key or a table's header; there are a few more where comments or texts hold them.
+_KEY_OR_HEADER = re.compile(r"=|^[ \t]*\[[^\],\n]*\.[^\],\n]*\.", re.MULTILINE)
 # Tags by which a key takes values of several shapes; they stand in a fault's location, not in the file.
 SHAPES = ("a number", "a list", "a table", "a name")
 _NEEDED = {
@@ -57,26 +64,100 @@ def read_toml(path: Path, model: type[Model]) -> Model:
 
 def read_contents(path: Path) -> dict[str, Any]:
     """The file's contents as they stand, keys to values."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise DataError(f"{path}: not a regular file; give a {path.suffix or '.toml'} file")
+    text, too_deep = read_text(path, _MEGABYTES_MAX), f"{path}: nested too deeply for a data file"
+    if _LONG_KEY_PATH.search(text):
+        raise DataError(too_deep)
+    if sum(1 for _ in _KEY_OR_HEADER.finditer(text)) > 4 * _KEYS_MAX:
+        raise DataError(f"{path}: too many keys; allowed: up to {_KEYS_MAX} in a data file")
     try:
-        return tomllib.loads(read_text(path, _MEGABYTES_MAX))
+        contents = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"{path}: not valid TOML: {error}") from None
     except ValueError:
         raise DataError(f"{path}: not valid TOML: a number has too many digits") from None
     except RecursionError:
-        raise DataError(f"{path}: nested too deeply for a data file") from None
+        raise DataError(too_deep) from None
+    level, keys = [contents], 0
+    for _ in range(_DEPTH_MAX):
+        keys += sum(len(table) for table in level if isinstance(table, dict))
+        inner = (v.values() if isinstance(v, dict) else v for v in level)
+        level = [e for entries in inner for e in entries if isinstance(e, dict | list)]
+    if level:
+        raise DataError(too_deep)
+    if keys > _KEYS_MAX:
+        raise DataError(f"{path}: {keys} keys; allowed: up to {_KEYS_MAX} in a data file")
+    return contents
 
 
 def checked(place: str, contents: dict[str, Any], model: type[Model]) -> Model:
     """Contents as a model; DataError with every fault, `place` in front, where they are not what it allows."""
     try:
         return model.model_validate(contents)
+    except ValidationError:
+        count, faults = faults_of(contents, model, _FAULTS_LISTED)
+    head = f"{place}: " if count == 1 else f"{place}: {count} faults\n  "
+    raise DataError(head + "\n  ".join(faults))
+
+
+def faults_of(contents: dict[str, Any], model: type[BaseModel], most: int) -> tuple[int, list[str]]:
+    """How many faults some contents have, and the first of them, each with key path, value and what is allowed.
+
+    Behind the first `most` stands how many more there are.
+    """
+    found = _all_faults(model, contents, ())
+    more = [f"and {len(found) - most} more"] if len(found) > most else []
+    return len(found), [_fault(model, fault) for fault in found[:most]] + more
+
+
+def _all_faults(
+    model: type[BaseModel], table: dict[str, Any], at: tuple[str | int, ...]
+) -> list[dict[str, Any]]:
+    """pydantic's faults, and those of the checks that it leaves out because some other key is wrong."""
+    try:
+        model.model_validate(table)
     except ValidationError as error:
-        faults = [_fault(model, dict(fault)) for fault in error.errors()]
-        head = f"{place}: " if len(faults) == 1 else f"{place}: {len(faults)} faults\n  "
-        more = len(faults) - _FAULTS_LISTED
-        listed = faults[:_FAULTS_LISTED] + ([f"and {more} more"] if more > 0 else [])
-        raise DataError(head + "\n  ".join(listed)) from None
+        found = [dict(fault) for fault in error.errors(include_url=False)]
+    else:
+        return []
+    faulty = list(dict.fromkeys(str(fault["loc"][0]) for fault in found if fault["loc"]))
+    inner = {}
+    for name in faulty:
+        field = model.model_fields.get(name)
+        below = next(_models_in(field.annotation), None) if field else None
+        if below is not None and isinstance(table.get(name), dict):
+            inner[name] = _all_faults(below, table[name], (*at, name))
+    own = [f | {"loc": (*at, *f["loc"])} for f in found if f["loc"] and f["loc"][0] not in inner]
+    whole = [{**fault, "loc": at} for fault in _faults_of_checks(model, table, faulty)]
+    return [*own, *(fault for faults in inner.values() for fault in faults), *whole]
+
+
+def _faults_of_checks(
+    model: type[BaseModel], table: dict[str, Any], faulty: list[str]
+) -> list[dict[str, Any]]:
+    """Faults that the checks of a whole table find in its good keys; one that asks for a faulty key is left out."""
+    fields = {n: f for n, f in model.model_fields.items() if n not in faulty}
+    parts = {name: (field.annotation, field) for name, field in fields.items()}
+    good = create_model("Good", __base__=FileModel, **parts).model_validate(
+        {name: table[name] for name in fields if name in table}
+    )
+    partial = model.model_construct(
+        set(table) & set(model.model_fields), **{name: getattr(good, name) for name in fields}
+    )
+    for name in faulty:
+        vars(partial).pop(name, None)
+    faults = []
+    for check in model.__pydantic_decorators__.model_validators.values():
+        if check.info.mode != "after":
+            continue
+        try:
+            check.func(partial)
+        except AttributeError:
+            continue
+        except ValueError as error:
+            faults.append({"type": "value_error", "input": table, "ctx": {"error": error}})
+    return faults
 
 
 def _fault(model: type[BaseModel], fault: dict[str, Any]) -> str:

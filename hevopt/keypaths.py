@@ -8,11 +8,21 @@ from hevopt.errors import DataError
 from hevopt.files import shown
 
 
-def with_changes(contents: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of nested tables with the values at some key paths (`soc.start`, `ratios.0`) replaced or added."""
+def with_changes(
+    contents: Mapping[str, Any], changes: Mapping[str, Any], within: str = ""
+) -> dict[str, Any]:
+    """A copy of nested tables with the values at some key paths (`soc.start`, `ratios.0`) replaced or added.
+
+    within: what a message puts before every key path, such as `gearbox.` where the tables are those of a gearbox
+    """
     changed = deepcopy(dict(contents))
     for key, value in changes.items():
         *way, last = key.split(".")
+        if not all((*way, last)):
+            raise DataError(
+                f"change of {shown(within + key)}: a part of the key path is empty; give the path of a "
+                "key as the file has it, such as machine.power_max_w"
+            )
         table: Any = changed
         for n, step in enumerate(way):
             if isinstance(table, dict):
@@ -21,13 +31,13 @@ def with_changes(contents: Mapping[str, Any], changes: Mapping[str, Any]) -> dic
                 table = table[int(step)]
             if not isinstance(table, dict | list):
                 raise DataError(
-                    f"change of {shown(key)}: {shown('.'.join(way[: n + 1]))} is {shown(table)}, not a "
-                    "table; give the path of a key as the file has it"
+                    f"change of {shown(within + key)}: {shown(within + '.'.join(way[: n + 1]))} is "
+                    f"{shown(table)}, not a table; give the path of a key as the file has it"
                 )
         if isinstance(table, list) and not (last.isdecimal() and int(last) < len(table)):
             raise DataError(
-                f"change of {shown(key)}: {shown('.'.join(way))} is a list of {len(table)} values; "
-                f"its entries are 0 to {len(table) - 1}"
+                f"change of {shown(within + key)}: {shown(within + '.'.join(way))} is a list of "
+                f"{len(table)} values; its entries are 0 to {len(table) - 1}"
             )
         table[int(last) if isinstance(table, list) else last] = deepcopy(value)
     return changed

@@ -159,12 +159,16 @@ def _branch(
         nox_kgps = np.where(fuel_kgps == 0, 0.0, nox_kgps)
     off_map = np.isnan(fuel_kgps) | np.isnan(nox_kgps)
     fuel_kgps, nox_kgps = np.nan_to_num(fuel_kgps), np.nan_to_num(nox_kgps)
-    flows = _flows(architecture, demand, joint, torques, fuel_kgps)
+    loss_w = machine_model.loss_w(
+        architecture.machine, torques.machine, joint.machine_speed_radps[:, None]
+    )
+    flows = _flows(architecture, demand, joint, torques, fuel_kgps, np.nan_to_num(loss_w))
     battery_power_w = flows["machine_electric_w"] + architecture.vehicle.auxiliary_power_w
     # What an alternator that follows its load leaves to the battery is rounding, not charge.
     battery_power_w = np.where(np.abs(battery_power_w) < _ROUNDING_W, 0.0, battery_power_w)
     reject = (
         bits(Reject.ENGINE_MAP, off_map)
+        | bits(Reject.MACHINE_MAP, np.isnan(loss_w))
         | limit_rejects(architecture, demand, joint, torques)
         | bits(
             Reject.BATTERY_LIMIT,
@@ -178,7 +182,12 @@ def _branch(
 
 
 def _flows(
-    architecture: Architecture, demand: Demand, joint: Joint, torques: Balance, fuel_kgps: Array
+    architecture: Architecture,
+    demand: Demand,
+    joint: Joint,
+    torques: Balance,
+    fuel_kgps: Array,
+    machine_loss_w: Array,
 ) -> dict[str, Array]:
     """Powers and losses. Clutch, gears, machine and brakes lose by laws of their own, so that the balances of
     shafts and car are checks; the engine's loss is what fuel power is not turned into work."""
@@ -189,7 +198,6 @@ def _flows(
     own = ~(joint.upstream | joint.shared)[:, None]
     fuel_power = fuel_kgps * architecture.engine.heating_value_jpkg
     machine_power = torques.machine * machine_speed
-    machine_loss = machine_model.loss_w(architecture.machine, torques.machine, machine_speed)
     engine_inertia = architecture.engine.inertia_kgm2 * joint.engine_accel_radps2[:, None]
     machine_inertia = architecture.machine.inertia_kgm2 * joint.machine_accel_radps2[:, None]
     own_loss = _gear_loss_w(torques.machine_net * machine_speed, joint.machine_efficiency[:, None])
@@ -201,8 +209,8 @@ def _flows(
         "fuel_power_w": fuel_power,
         "engine_loss_w": fuel_power - torques.engine * engine_speed,
         "engine_inertia_w": engine_inertia * engine_speed,
-        "machine_electric_w": machine_power + machine_loss,
-        "machine_loss_w": machine_loss,
+        "machine_electric_w": machine_power + machine_loss_w,
+        "machine_loss_w": machine_loss_w,
         "machine_inertia_w": machine_inertia * machine_speed,
         "machine_upstream": joint.upstream[:, None].astype(float),
         "machine_shared": joint.shared[:, None].astype(float),

@@ -45,7 +45,7 @@ coupling = { kind = "crankshaft" }
     [
         ({"machine.power_w": 1}, "unknown key power_w; close matches: power_max_w"),
         ({"machine.power_max_w": -1}, "machine.power_max_w changed: power_max_w = -1; allowed"),
-        ({"gearbox.ratios.7": 1}, "'ratios' is a list of 6 values"),
+        ({"gearbox.ratios.7": 1}, "'gearbox.ratios' is a list of 6 values; its entries are 0 to 5"),
         ({"name.x": 1}, "not a table"),
         ({"machine": "nope"}, "component 'nope' not found"),
         ({"machine": {"power_max_w": 1}}, 'needs file = "name"'),

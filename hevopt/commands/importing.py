@@ -1,0 +1,111 @@
+"""`hevopt cycles import`: a logged drive or another tool's cycle to a cycle file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hevopt.commands.terminal import write
+from hevopt.errors import DataError
+
+if TYPE_CHECKING:
+    from hevopt.imports.cycle_import import Imported
+
+
+def import_cycle(
+    file: Annotated[Path, typer.Argument(help="CSV, TSV, .xlsx, .mat or VECTO .vdri file.")],
+    speed_unit: Annotated[
+        str | None, typer.Option(help="Unit of speed where the file names none: km/h, m/s, mph ...")
+    ] = None,
+    time_unit: Annotated[
+        str | None, typer.Option(help="Unit of time where the file names none: s, ms, min, h.")
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROLE=NAME",
+            help="The column of time, speed, distance, stop, grade, altitude, gear or clutch_open, by name or "
+            "number; nothing after = leaves it out. May be repeated.",
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROLE=UNIT", help="Unit of another column, such as grade=%. May be repeated."
+        ),
+    ] = None,
+    sheet: Annotated[str | None, typer.Option(help="Sheet of a workbook that has several.")] = None,
+    acceleration: Annotated[
+        float | None,
+        typer.Option(
+            help="m/s² with which target speeds over distance are followed, as in VECTO's cycles."
+        ),
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Mend faults in the data; every change is listed.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Cycle file to write, NAME.csv.")] = None,
+) -> None:
+    """Read a drive in another tool's shape, check it, resample it to 1 Hz; write it with --out."""
+    from hevopt.imports import cycle_import
+    from hevopt.writing import write_whole
+
+    if out is not None:
+        _check_out(out, file)
+    units = _pairs("--unit", unit)
+    for role, given, option in (
+        ("speed", speed_unit, "--speed-unit"),
+        ("time", time_unit, "--time-unit"),
+    ):
+        if given is not None and role in units:
+            raise DataError(
+                f"the unit of {role} is given by both {option} and --unit; leave one out"
+            )
+        units |= {} if given is None else {role: given}
+    imported = cycle_import.import_cycle(
+        file, columns=_pairs("--column", column), units=units, sheet=sheet, repair=repair,
+        acceleration_mps2=acceleration,
+    )  # fmt: skip
+    _show(imported)
+    if out is None:
+        write("not written; add --out NAME.csv to write the cycle")
+        return
+    write_whole(out, imported.text.encode())
+    write(f"written to {out}; use it with --cycle {out}")
+
+
+def _show(imported: "Imported") -> None:
+    from hevopt.imports.cycle_import import summary
+
+    for text in imported.assumptions:
+        write(f"read as: {text}")
+    for text in imported.rules:
+        write(f"made by: {text}")
+    if imported.repairs:
+        heading = f"repairs: {len(imported.repairs)}, by line of {imported.source}"
+        write("\n  ".join([heading, *imported.repairs]))
+    for name, text in summary(imported):
+        write(f"{name:18}{text}")
+
+
+def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for text in given or []:
+        role, equals, value = text.partition("=")
+        if not equals or role in pairs:
+            why = "is not of the form ROLE=VALUE" if not equals else f"gives {role} twice"
+            raise DataError(
+                f"{option} {text!r} {why}; such as {option} speed={'NAME' if 'c' in option else 'km/h'}"
+            )
+        pairs[role.strip()] = value
+    return pairs
+
+
+def _check_out(out: Path, file: Path) -> None:
+    from hevopt.writing import check_writable
+
+    if out.suffix.lower() != ".csv":
+        raise DataError(f"--out {out}: a cycle file's name ends in .csv; give such a name")
+    target = check_writable(out)
+    if target.exists() and file.exists() and target.samefile(file):
+        raise DataError(f"--out {out} is the file that is read; choose another name")

@@ -1,0 +1,102 @@
+"""JSON Schema (draft 2020-12) of architecture and component files: types, ranges, units and meanings of all keys.
+
+What a schema cannot say, such as that a list must increase, is checked where the files are read.
+"""
+
+from typing import Any
+
+from pydantic.json_schema import models_json_schema
+
+from hevopt.architecture_files import (
+    ArchitectureFile,
+    BatteryFile,
+    CarFile,
+    EngineFile,
+    GearboxFile,
+    MachineFile,
+)
+from hevopt.datafile import FileModel
+from hevopt.errors import unknown_name
+from hevopt.key_meanings import MEANINGS
+
+# A component in an architecture: its file, or its file and keys in place of the file's.
+_NAMED = {
+    "type": "string",
+    "description": "a name, looked up in components/ beside the file and then among the shipped ones, or a path",
+}
+_CHANGED = {
+    "type": "object",
+    "description": "the file, and keys that replace the file's",
+    "properties": {"file": _NAMED},
+    "required": ["file"],
+}
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+MODELS: dict[str, type[FileModel]] = {
+    "architecture": ArchitectureFile,
+    "car": CarFile,
+    "engine": EngineFile,
+    "gearbox": GearboxFile,
+    "machine": MachineFile,
+    "battery": BatteryFile,
+}
+
+
+def schema(kind: str | None = None) -> dict[str, Any]:
+    """The schema of one kind of file, or without a kind that of a file of any."""
+    if kind is not None and kind not in MODELS:
+        raise unknown_name("kind of file", kind, list(MODELS))
+    _, found = models_json_schema([(model, "validation") for model in MODELS.values()])
+    tables = {name: _table(name, table) for name, table in found["$defs"].items()}
+    references = {key: {"$ref": f"#/$defs/{model.__name__}"} for key, model in MODELS.items()}
+    title = f"hevopt {kind or 'architecture or component'} file"
+    top = {"anyOf": list(references.values())} if kind is None else references[kind]
+    if kind is not None:
+        tables = {name: tables[name] for name in _reached(MODELS[kind].__name__, tables)}
+    return {"$schema": DIALECT, "title": title, **top, "$defs": tables}
+
+
+def _table(name: str, table: dict[str, Any]) -> dict[str, Any]:
+    """The schema of a table, its keys described; a key that may be left out has no null, which TOML lacks."""
+    keys = {}
+    for key, found in table["properties"].items():
+        unit, meaning = MEANINGS[name][key]
+        shapes = [shape for shape in found.get("anyOf", []) if shape != {"type": "null"}]
+        if shapes:
+            found = {k: value for k, value in found.items() if k != "anyOf"} | shapes[0]
+        if found.get("default", "") is None:
+            del found["default"]
+        found.pop("title", None)
+        if {"additionalProperties": True, "type": "object"} in found.get("oneOf", []):
+            found = {"oneOf": [_NAMED, _CHANGED]}
+        keys[key] = {"description": f"{meaning} ({unit})" if unit.strip("-") else meaning} | found
+        if unit:
+            keys[key]["x-unit"] = unit
+    return {k: v for k, v in table.items() if k != "title"} | {"properties": keys}
+
+
+def _reached(name: str, tables: dict[str, Any]) -> list[str]:
+    """The table of a name and those that it refers to, at any depth."""
+    names = [name]
+    for reached in names:
+        text = str(tables[reached])
+        names += [n for n in tables if f"'#/$defs/{n}'" in text and n not in names]
+    return names
+
+
+def allowed(shape: dict[str, Any], tables: dict[str, Any]) -> str:
+    """What a value may be, in words, by its schema."""
+    if "oneOf" in shape:
+        return ", or ".join(allowed(inner, tables) for inner in shape["oneOf"])
+    if "enum" in shape:
+        return "one of " + ", ".join(shape["enum"])
+    if "$ref" in shape:
+        keys = tables[shape["$ref"].rpartition("/")[2]]["properties"]
+        return f"a table of {', '.join(keys)}"
+    if "minimum" in shape or "maximum" in shape:
+        whole = "whole number, " if shape["type"] == "integer" else ""
+        return f"{whole}{shape['minimum']:g} to {shape['maximum']:g}"
+    if shape["type"] == "array":
+        return f"a list, each {allowed(shape['items'], tables)}"
+    return {"boolean": "true or false", "string": "text", "object": "a table"}.get(
+        shape["type"], f"a {shape['type']}"
+    )

@@ -1,0 +1,63 @@
+"""A quantity on a rectangular grid of speed and torque, never extrapolated.
+
+A cell with four measured corners is interpolated bilinearly; one with three, linearly on the triangle of those
+three, its other half being outside. The two agree on the edges that they share.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+# Share of a cell by which a point may miss an edge: rounding of a point computed to lie on it.
+_ROUNDING = 1e-9
+
+
+def interpolated(
+    grid_speed_radps: Array,
+    grid_torque_nm: Array,
+    values: Array,
+    torque_nm: Array,
+    speed_radps: Array,
+) -> Array:
+    """The quantity at any torques and speeds, NaN outside the grid and next to what was not measured.
+
+    grid_speed_radps: (speed,), grid_torque_nm: (torque,), values: (speed, torque), NaN where not measured
+    """
+    speed, torque = np.broadcast_arrays(speed_radps, torque_nm)
+    i, x = _place(grid_speed_radps, speed)
+    j, y = _place(grid_torque_nm, torque)
+    corners = (
+        (values[i, j], (1 - x) * (1 - y)),
+        (values[i, j + 1], (1 - x) * y),
+        (values[i + 1, j], x * (1 - y)),
+        (values[i + 1, j + 1], x * y),
+    )
+    result = np.zeros(speed.shape)
+    for corner, weight in corners:
+        # A corner that was not measured spoils only what leans on it.
+        result += np.where(weight == 0, 0.0, weight * corner)
+    if np.isnan(values).any():
+        result = np.where(np.isnan(result), _on_triangle(*(c for c, _ in corners), x, y), result)
+    outside = (np.abs(x - 0.5) > 0.5 + _ROUNDING) | (np.abs(y - 0.5) > 0.5 + _ROUNDING)
+    return np.where(outside, np.nan, result)
+
+
+def _place(axis: Array, at: Array) -> tuple[NDArray[np.int64], Array]:
+    """The cell's number along an axis, and the share of it passed."""
+    cell = np.clip(np.searchsorted(axis, at, "right") - 1, 0, len(axis) - 2)
+    return cell, (at - axis[cell]) / (axis[cell + 1] - axis[cell])
+
+
+def _on_triangle(low: Array, up: Array, right: Array, far: Array, x: Array, y: Array) -> Array:
+    """Linear on the three known corners: (0, 0) low, (0, 1) up, (1, 0) right, (1, 1) far; else NaN."""
+    result = np.full(x.shape, np.nan)
+    # The corner opposite the missing one, its two neighbours, and the distances from it along x and y.
+    for opposite, along_x, along_y, u, v in (
+        (low, right, up, x, y),
+        (up, far, low, x, 1 - y),
+        (right, low, far, 1 - x, y),
+        (far, up, right, 1 - x, 1 - y),
+    ):
+        plane = opposite + (along_x - opposite) * u + (along_y - opposite) * v
+        result = np.where(np.isnan(result) & (u + v <= 1 + _ROUNDING), plane, result)
+    return result

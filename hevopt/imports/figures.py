@@ -1,0 +1,111 @@
+"""Plots as PNG bytes: what a map covers, and a coast-down with its fit. Same data, same bytes."""
+
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hevopt.architecture_files import EngineFile
+from hevopt.imports.coastdown import RoadLoad, Run
+from hevopt.imports.map_import import Imported
+from hevopt.imports.map_report import envelope_of
+from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_DPI = 110
+_COLOURS = {1: "#0b6e99", -1: "#c2571a"}
+
+
+def map_figure(imported: Imported) -> bytes:
+    """Coverage of a map: cells known, measured points, limits, and efficiency as contours."""
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    axes = figure.subplots()
+    grid, file = imported.grid, imported.file
+    rpm, torque = grid.speed_radps * RPM_PER_RADPS, grid.torque_nm
+    known = np.ma.masked_where(np.isnan(grid.values), np.ones_like(grid.values))
+    axes.pcolormesh(rpm, torque, known.T, cmap="Greens", vmin=0, vmax=3, shading="nearest")
+    _efficiency_contours(axes, imported)
+    points = imported.lines.points
+    axes.plot(
+        points.speed_radps * RPM_PER_RADPS, points.torque_nm, ".", color="#444444", markersize=3,
+        label=f"{len(points.value)} measured points",
+    )  # fmt: skip
+    envelope = envelope_of(file)
+    high, low = ("full load", "motoring") if isinstance(file, EngineFile) else ("limit", None)
+    axes.plot(envelope.speed_radps * RPM_PER_RADPS, envelope.high_nm, "k-", label=high)
+    axes.plot(envelope.speed_radps * RPM_PER_RADPS, envelope.low_nm, "k--", label=low)
+    axes.set(
+        xlabel="speed, rpm", ylabel="torque, Nm", title=_plain(f"{file.name}: what the map covers")
+    )
+    axes.legend(loc="upper right")
+    return _png(figure)
+
+
+def _efficiency_contours(axes: "Axes", imported: Imported) -> None:
+    grid, file = imported.grid, imported.file
+    speed, torque = np.meshgrid(grid.speed_radps, grid.torque_nm, indexing="ij")
+    power = np.where(torque * speed == 0, np.nan, np.abs(torque * speed))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if isinstance(file, EngineFile):
+            heat = grid.values * file.fuel.heating_value_mjpkg * 1e6
+            efficiency = np.where((torque > 0) & (heat > 0), power / heat, np.nan)
+        else:
+            efficiency = np.where(
+                torque > 0, power / (power + grid.values), 1 - grid.values / power
+            )
+    shown = np.ma.masked_invalid(efficiency)
+    if shown.count() < 4 or min(shown.shape) < 2:
+        return
+    top = float(shown.max())
+    levels = [top * share for share in (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)]
+    contours = axes.contour(
+        grid.speed_radps * RPM_PER_RADPS, grid.torque_nm, shown.T, levels=levels,
+        colors="#1b5e20", linewidths=0.8,
+    )  # fmt: skip
+    axes.clabel(contours, fmt=lambda value: f"{value:.0%}", fontsize=8)
+
+
+def coastdown_figure(runs: list[Run], fit: RoadLoad) -> bytes:
+    """Speeds with the fit, what is left, and the resistance with its 95 % band."""
+    figure = Figure(figsize=(9, 10), layout="constrained")
+    speeds, residuals, force = figure.subplots(3, 1, height_ratios=(2, 1, 2))
+    said: set[int] = set()
+    for run, fitted in zip(runs, fit.speeds_mps, strict=True):
+        t, colour = run.time_s - run.time_s[0], _COLOURS[run.direction]
+        label = None if run.direction in said else f"direction {run.direction:+d}"
+        said.add(run.direction)
+        speeds.plot(t, run.speed_mps * KMH_PER_MPS, ".", color=colour, markersize=2, label=label)
+        speeds.plot(t, fitted * KMH_PER_MPS, "-", color="black", linewidth=0.7)
+        residuals.plot(t, (run.speed_mps - fitted) * KMH_PER_MPS, "-", color=colour, linewidth=0.7)
+    low = min(run.speed_mps.min() for run in runs)
+    high = max(run.speed_mps.max() for run in runs)
+    v = np.linspace(low, high, 100)
+    resistance, half = fit.force_n(v)
+    force.plot(v * KMH_PER_MPS, resistance, "k-", label="both directions")
+    force.fill_between(
+        v * KMH_PER_MPS,
+        resistance - half,
+        resistance + half,
+        color="#bbbbbb",
+        label="95 % confidence",
+    )
+    speeds.set(xlabel="time, s", ylabel="speed, km/h", title="coast-down: samples and fit (black)")
+    residuals.set(xlabel="time, s", ylabel="sample less fit, km/h")
+    force.set(xlabel="speed, km/h", ylabel="resistance, N")
+    for axes in (speeds, force):
+        axes.legend()
+    return _png(figure)
+
+
+def _plain(text: str) -> str:
+    """Text without what matplotlib takes for a formula."""
+    return text.replace("$", r"\$")
+
+
+def _png(figure: Figure) -> bytes:
+    out = BytesIO()
+    figure.savefig(out, format="png", dpi=_DPI, metadata={"Software": None})
+    return out.getvalue()

@@ -1,0 +1,133 @@
+"""An engine component from a measured map: fuel, and NOx, on a grid of speed and torque, with its curves."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hevopt.architecture_files import EngineFile
+from hevopt.datafile import checked
+from hevopt.errors import DataError
+from hevopt.imports.map_curves import check_idle, flow_grid, full_load, motoring_curve, on_speeds
+from hevopt.imports.map_grid import Lines, axes_of, in_lines
+from hevopt.imports.map_import import (
+    Imported,
+    Request,
+    check_used,
+    like_component,
+    rpm_list,
+    with_given,
+)
+from hevopt.imports.map_points import EngineFacts, read_points
+from hevopt.units import RPM_PER_RADPS, TO_SI
+
+_ENGINE_KEYS = (
+    "displacement_cm3", "bore_mm", "stroke_mm", "idle_rpm", "inertia_kgm2", "start_fuel_g", "fuel",
+)  # fmt: skip
+_CORNERS = (
+    "cells cut by the full-load curve: corners beyond it continue the row, so that the map reaches up to the "
+    "curve; the engine never goes there"
+)
+_FUEL_KEYS = ("heating_value_mjpkg", "density_kgpl", "co2_kgpkg")
+
+
+def import_engine(request: Request) -> Imported:
+    """An engine with a measured map; DataError where something is missing or wrong."""
+    like = like_component(request.like, EngineFile)
+    base, origins = _engine_base(request, like)
+    facts = _facts(base)
+    points = read_points(request.source, "fuel", facts)
+    if points is None:
+        raise DataError(
+            f"{request.source.path.name}: no column of fuel, specific consumption or efficiency found; name it "
+            "with --column fuel=NAME (or specific=, efficiency=)"
+        )
+    idle_radps = base["idle_rpm"] / RPM_PER_RADPS
+    lines = in_lines(points, proportional=True, idle_radps=idle_radps)
+    axes = axes_of(lines)
+    motoring = motoring_curve(request, lines, like, base["displacement_cm3"], facts)
+    full = full_load(request, lines, facts)
+    grid = flow_grid(lines, axes, motoring, full)
+    notes = [*points.notes, *lines.notes, axes.rule, motoring.note, full.note, _CORNERS]
+    contents = base | {
+        "full_load": {
+            "speed_rpm": rpm_list(full.speed_radps),
+            "torque_nm": full.torque_nm.tolist(),
+        },
+        "fuel_map": {
+            "speed_rpm": rpm_list(grid.speed_radps),
+            "torque_nm": grid.torque_nm.tolist(),
+            "motoring_torque_nm": on_speeds(motoring, grid.speed_radps).tolist(),
+            "fuel_gps": (grid.values * 1e3).tolist(),
+        },
+    }
+    used = points.roles | motoring.roles | full.roles
+    nox = _nox(request, facts, points.rectangular, idle_radps)
+    if nox is None:
+        notes.append("NOx: none given; the engine emits none in any result")
+    else:
+        used |= nox.points.roles
+        notes += [note for note in nox.points.notes if note.startswith("nox")]
+        nox_grid = flow_grid(nox, axes, motoring, full)
+        contents["fuel_map"]["nox_gps"] = (nox_grid.values * 1e3).tolist()
+        less = int((np.isnan(nox_grid.values) & ~np.isnan(grid.values)).sum())
+        if less:
+            notes.append(f"NOx: not known at {less} cells that have fuel; the car cannot use them")
+    check_idle(base["idle_rpm"], full)
+    check_used(request, used)
+    file = checked(f"component from {request.source.path.name}", contents, EngineFile)
+    return Imported(contents, file, origins, tuple(notes), grid, lines)
+
+
+def _engine_base(
+    request: Request, like: EngineFile | None
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Every key but the maps, and where each comes from; DataError naming all that are missing."""
+    base: dict[str, Any] = {"name": request.source.path.stem}
+    origins = {"name": "the file's name"}
+    if like is not None:
+        base |= {key: value for key, value in like.model_dump().items() if key in _ENGINE_KEYS}
+        origins |= dict.fromkeys((*_ENGINE_KEYS[:-1], *_dotted(_FUEL_KEYS)), f"from {request.like}")
+    base, origins = with_given(base, origins, request.given)
+    fuel = base.get("fuel") if isinstance(base.get("fuel"), dict) else {}
+    missing = [key for key in _ENGINE_KEYS[:-1] if key not in base]
+    missing += [f"fuel.{key}" for key in _FUEL_KEYS if key not in fuel]
+    if missing:
+        raise DataError(
+            f"the component needs {', '.join(missing)}; give --like NAME (such as engine_diesel_1600) to take "
+            "them from another engine, or --set KEY=VALUE for each"
+        )
+    return base, origins
+
+
+def _dotted(keys: tuple[str, ...]) -> list[str]:
+    return [f"fuel.{key}" for key in keys]
+
+
+def _facts(base: Mapping[str, Any]) -> EngineFacts:
+    """The figures that units need, checked as the component's file will be."""
+    values = {
+        "idle_rpm": base["idle_rpm"],
+        "displacement_cm3": base["displacement_cm3"],
+        "fuel.heating_value_mjpkg": base["fuel"]["heating_value_mjpkg"],
+        "fuel.density_kgpl": base["fuel"]["density_kgpl"],
+    }
+    for key, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+            raise DataError(f"{key} = {value!r}: a number above 0 is needed")
+    _, displacement, heat, density = values.values()
+    return EngineFacts(
+        displacement * TO_SI["_cm3"][1], heat * TO_SI["_mjpkg"][1], density * TO_SI["_kgpl"][1]
+    )
+
+
+def _nox(request: Request, facts: EngineFacts, in_grid: bool, idle_radps: float) -> Lines | None:
+    """NOx by speed lines; a grid of fuel holds none, it is a table of its own."""
+    source, points = request.extra.get("nox"), None
+    if source is not None or not in_grid:
+        points = read_points(source or request.source, "nox", facts)
+    if points is None and source is not None:
+        raise DataError(
+            f"{source.path.name}: no column of NOx found; name it with --column nox=NAME"
+        )
+    return None if points is None else in_lines(points, proportional=True, idle_radps=idle_radps)

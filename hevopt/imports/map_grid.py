@@ -1,0 +1,237 @@
+"""Measured points put on a rectangular grid of speed and torque, without extrapolation.
+
+Rule. Speeds closer than 12 rpm or 0.5 % are one speed line; flows move to its mean in proportion to speed. Where
+the lines share their torques (90 % of all torques between their lowest and highest are measured), lines and torques
+are the grid and every value stays as it is. Other points are joined by triangles (Delaunay, both axes scaled to
+equal length) and interpolated linearly on them; what lies outside their hull, or beyond the outermost torques
+measured around that speed, is not a number.
+"""
+
+from dataclasses import dataclass
+from math import ceil, floor, log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.grid import interpolated
+from hevopt.imports.map_points import Points
+from hevopt.units import RPM_PER_RADPS
+
+Array = NDArray[np.float64]
+
+_LINE_RPM = 12.0
+_LINE_SHARE = 0.005
+_SAME = 1e-6
+_FILLED = 0.9
+_STEPS = 60
+_TORQUE_STEPS = 80
+# A rectangle of points has two ways to cut it in triangles; this decides, where rounding would otherwise.
+_SHEAR = 1e-3
+_POINTS_MIN = 4
+_AXIS_MAX = 400
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """A quantity on axes; values: (speed, torque), NaN where not measured."""
+
+    speed_radps: Array
+    torque_nm: Array
+    values: Array
+
+    def at(self, torque_nm: Array, speed_radps: Array) -> Array:
+        """Interpolated as the car will use it; NaN outside."""
+        return interpolated(self.speed_radps, self.torque_nm, self.values, torque_nm, speed_radps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Axes:
+    """Where a grid's values stand. lattice: the points stand there already; rule: how it came about, in words."""
+
+    speed_radps: Array
+    torque_nm: Array
+    lattice: bool
+    rule: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """Points by speed line. line: (point,) which; speed_radps: (line,); regular: whether there are such lines."""
+
+    points: Points
+    line: NDArray[np.int64]
+    speed_radps: Array
+    regular: bool
+    notes: tuple[str, ...]
+
+
+def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> Lines:
+    """The points moved onto speed lines, several at one place averaged.
+
+    proportional: the quantity is a flow, which moves in proportion to speed; idle_radps: a line this close to
+    idle speed is the one at idle.
+    """
+    if len(points.value) < _POINTS_MIN:
+        raise DataError(f"{len(points.value)} points; a map needs {_POINTS_MIN} or more")
+    line, mean = _clusters(points.speed_radps, _LINE_RPM / RPM_PER_RADPS, _LINE_SHARE)
+    idle = np.abs(mean - idle_radps) <= _LINE_RPM / RPM_PER_RADPS
+    mean = np.where(idle & (idle.sum() == 1), idle_radps, mean)
+    moved = np.abs(points.speed_radps - mean[line])
+    reach = np.maximum(_LINE_RPM / RPM_PER_RADPS, _LINE_SHARE * mean[line])
+    regular = 1 < len(mean) <= len(line) / 2 and (moved <= reach).all()
+    if points.rectangular or not regular:
+        line, mean = _clusters(points.speed_radps, 0.0, _SAME)
+        moved = np.zeros(len(line))
+    mean = _tidy(mean * RPM_PER_RADPS) / RPM_PER_RADPS
+    notes = []
+    if moved.max() > _SAME * mean.max():
+        rpm = moved.max() * RPM_PER_RADPS
+        notes.append(f"{len(mean)} speed lines; points moved to them by up to {rpm:.3g} rpm")
+    value = points.value
+    if proportional:
+        before = np.where(points.speed_radps > 0, points.speed_radps, 1.0)
+        value = np.where(moved > _SAME * before, value * mean[line] / before, value)
+    merged, line, repeated = _averaged(points, line, mean, value)
+    if repeated:
+        notes.append(f"{repeated} points measured more than once, averaged")
+    return Lines(merged, line, mean, regular or points.rectangular, tuple(notes))
+
+
+def axes_of(lines: Lines) -> Axes:
+    """The axes of the grid for the points."""
+    torque = np.unique(lines.points.torque_nm)
+    if lines.points.rectangular or (lines.regular and _share_torques(lines, torque)):
+        _check_axes(lines.speed_radps, torque)
+        return Axes(
+            lines.speed_radps, torque, True, "measured on a rectangular grid, used as it is"
+        )
+    low, high = lines.speed_radps[0], lines.speed_radps[-1]
+    speed = np.linspace(low, high, _STEPS + 1)
+    if lines.regular:
+        step = (high - low) / _STEPS
+        pieces = [
+            np.linspace(a, b, max(ceil((b - a) / step - _SAME), 1), endpoint=False)
+            for a, b in zip(lines.speed_radps[:-1], lines.speed_radps[1:], strict=True)
+        ]
+        speed = np.append(np.concatenate(pieces), high)
+    torque = torque_axis(torque[0], torque[-1])
+    _check_axes(speed, torque)
+    how = "speed lines" if lines.regular else "irregular points"
+    rule = f"{how} put on a grid: linear on the triangles between measured points, nothing outside them"
+    return Axes(speed, torque, False, rule)
+
+
+def _share_torques(lines: Lines, torque: Array) -> bool:
+    ends = [envelope_nm(lines, sign)[1] for sign in (-1.0, 1.0)]
+    between = (torque >= ends[0][:, None]) & (torque <= ends[1][:, None])
+    return len(lines.line) >= _FILLED * between.sum()
+
+
+def torque_axis(low: float, high: float) -> Array:
+    """Round torques between the ends, and the ends themselves."""
+    span = high - low
+    if span <= 0:
+        raise DataError("all points have one torque; a map needs points at several torques")
+    decade = 10.0 ** floor(log10(span / _TORQUE_STEPS))
+    step = next(f * decade for f in (1, 2, 2.5, 5, 10) if span / (f * decade) <= _TORQUE_STEPS)
+    inner = step * np.arange(ceil(low / step), floor(high / step) + 1)
+    close = _SAME * span
+    inner = inner[(inner > low + close) & (inner < high - close)]
+    return np.concatenate([[low], inner, [high]])
+
+
+def on_axes(lines: Lines, speed_radps: Array, torque_nm: Array) -> Grid:
+    """The points on the axes: as they are where all lie on them, else by the rule of triangles."""
+    points = lines.points
+    i = _index(speed_radps, lines.speed_radps[lines.line])
+    j = _index(torque_nm, points.torque_nm)
+    values = np.full((len(speed_radps), len(torque_nm)), np.nan)
+    if lines.regular and (i >= 0).all() and (j >= 0).all():
+        values[i, j] = points.value
+        return Grid(speed_radps, torque_nm, values)
+    return Grid(speed_radps, torque_nm, _on_triangles(lines, speed_radps, torque_nm))
+
+
+def envelope_nm(lines: Lines, sign: float = 1.0) -> tuple[Array, Array]:
+    """Speeds, and the outermost torque measured there: highest with sign 1, lowest with -1.
+
+    Without speed lines: over a twentieth of the speed range each.
+    """
+    line, speed = lines.line, lines.speed_radps
+    if not lines.regular:
+        edges = np.linspace(speed[0], speed[-1], 21)
+        line = np.clip(np.searchsorted(edges, speed[line], "right") - 1, 0, 19)
+        used, line = np.unique(line, return_inverse=True)
+        speed = ((edges[1:] + edges[:-1]) / 2)[used]
+        speed[0], speed[-1] = edges[0], edges[-1]
+    outermost = np.full(len(speed), -np.inf)
+    np.maximum.at(outermost, line, sign * lines.points.torque_nm)
+    return speed, sign * outermost
+
+
+def _on_triangles(lines: Lines, speed_radps: Array, torque_nm: Array) -> Array:
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import QhullError
+
+    points, speed = lines.points, lines.speed_radps[lines.line]
+    span = np.array([max(np.ptp(speed), _SAME), max(np.ptp(points.torque_nm), _SAME)])
+    places = np.column_stack([speed, points.torque_nm]) / span
+    places[:, 1] += _SHEAR * places[:, 0]
+    try:
+        surface = LinearNDInterpolator(places, points.value)
+    except QhullError:
+        raise DataError(
+            "all points lie on one line; a map needs several speeds and torques"
+        ) from None
+    x, y = np.meshgrid(speed_radps / span[0], torque_nm / span[1], indexing="ij")
+    values = surface(np.stack([x, y + _SHEAR * x], axis=-1))
+    low, high = (np.interp(speed_radps, *envelope_nm(lines, sign))[:, None] for sign in (-1, 1))
+    inside = (torque_nm >= low - _SAME * span[1]) & (torque_nm <= high + _SAME * span[1])
+    return np.where(inside, values, np.nan)
+
+
+def _averaged(points: Points, line: NDArray[np.int64], mean: Array, value: Array):
+    """Points with one at each place, their lines, and how many places had several."""
+    of_torque, torque = _clusters(points.torque_nm, 0.0, _SAME)
+    key = np.column_stack([line, of_torque])
+    places, first, which, count = np.unique(
+        key, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    total = np.bincount(which.ravel(), value)
+    kept = Points(
+        mean[places[:, 0]], torque[places[:, 1]], total / count, points.lines[first],
+        points.rectangular, points.roles, points.notes,
+    )  # fmt: skip
+    return kept, places[:, 0], int((count > 1).sum())
+
+
+def _clusters(values: Array, apart: float, share: float) -> tuple[NDArray[np.int64], Array]:
+    """Number of each value's cluster, and the clusters' means, rising.
+
+    Neighbours are of one cluster up to a distance `apart`, or a share of the value; rounding is none.
+    """
+    order = np.argsort(values, kind="stable")
+    ordered, rounding = values[order], _SAME * np.abs(values).max()
+    reach = np.maximum(np.maximum(apart, share * np.abs(ordered)), rounding)
+    cluster = np.empty(len(values), dtype=np.int64)
+    cluster[order] = np.cumsum(np.concatenate([[False], np.diff(ordered) > reach[1:]]))
+    return cluster, np.bincount(cluster, values) / np.bincount(cluster)
+
+
+def _tidy(values: Array) -> Array:
+    """Values without what a change of units left behind the tenth digit."""
+    return np.array([float(f"{value:.9g}") for value in values])
+
+
+def _index(axis: Array, values: Array) -> NDArray[np.int64]:
+    """Where the values stand on the axis; -1 where they do not."""
+    nearest = np.abs(values[:, None] - axis).argmin(axis=1)
+    on_it = np.abs(axis[nearest] - values) <= _SAME * max(np.abs(axis).max(), 1e-12)
+    return np.where(on_it, nearest, -1)
+
+
+def _check_axes(speed_radps: Array, torque_nm: Array) -> None:
+    for name, axis in (("speeds", speed_radps), ("torques", torque_nm)):
+        if not 2 <= len(axis) <= _AXIS_MAX:
+            raise DataError(f"{len(axis)} {name}; a map needs 2 to {_AXIS_MAX} of them")

@@ -1,0 +1,78 @@
+"""What an import of a measured map is asked for and gives, whatever the component."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.architecture_files import EngineFile, MachineFile
+from hevopt.datafile import Model, read_toml
+from hevopt.errors import DataError
+from hevopt.files import find
+from hevopt.imports.map_grid import Grid, Lines
+from hevopt.imports.map_tables import Source
+from hevopt.keypaths import with_changes
+from hevopt.units import RPM_PER_RADPS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What to import. extra: "full", "motoring", "nox" -> its own table; given: key path -> value in its place."""
+
+    source: Source
+    extra: Mapping[str, Source]
+    like: str | None
+    given: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Imported:
+    """A component. contents: of its file, also checked as `file`; origins: key path -> where it comes from;
+    notes: what was read, assumed and left out; grid and lines: the map, and the points behind it
+    """
+
+    contents: Mapping[str, Any]
+    file: EngineFile | MachineFile
+    origins: Mapping[str, str]
+    notes: tuple[str, ...]
+    grid: Grid
+    lines: Lines
+
+
+def like_component(name: str | None, model: type[Model]) -> Model | None:
+    """The component that gives keys; DataError where it is scaled, as its keys are not those of its size then."""
+    if name is None:
+        return None
+    found = read_toml(find("architectures/components", name, ".toml"), model)
+    if found.scale is not None:
+        raise DataError(
+            f"--like {name}: this component is scaled; name the one that it scales, or copy its keys with --set"
+        )
+    return found
+
+
+def with_given(
+    base: dict[str, Any], origins: dict[str, str], given: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Keys and their origins with those that the user gives in their place."""
+    return with_changes(base, given), origins | dict.fromkeys(given, "given")
+
+
+def check_used(request: Request, used: frozenset[str]) -> None:
+    """DataError for a role that an option names and no table holds."""
+    named = {*request.source.columns, *request.source.units}
+    unused = sorted(named - used)
+    if unused:
+        raise DataError(
+            f"{', '.join(unused)}: named with --column or --unit, but not read; the tables give "
+            f"{', '.join(sorted(used))}"
+        )
+
+
+def rpm_list(speed_radps: Array) -> list[float]:
+    """Speeds for a component's file, without what a change of units left behind the ninth digit."""
+    return [float(f"{s * RPM_PER_RADPS:.9g}") for s in speed_radps]

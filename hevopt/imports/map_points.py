@@ -1,0 +1,186 @@
+"""Measured points of an engine or machine map, and its curves, in SI.
+
+Fuel and NOx become mass flows: specific consumption and efficiency say nothing where there is no power, and a flow
+is nearly linear in torque. What a row cannot say is left out, and listed.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.imports.map_tables import VALUES_OF, Source, Table, curve_table, read_table
+from hevopt.imports.measured import columns_found
+from hevopt.imports.measured_rows import runs
+from hevopt.units import RPM_PER_RADPS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class EngineFacts:
+    """What some units need; None where unknown."""
+
+    displacement_m3: float | None
+    heating_value_jpkg: float | None
+    fuel_density_kgpm3: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """A quantity at measured points; arrays (point,).
+
+    rectangular: read from a grid; roles: of the columns read; notes: how they were read
+    """
+
+    speed_radps: Array
+    torque_nm: Array
+    value: Array
+    lines: NDArray[np.int64]
+    rectangular: bool
+    roles: frozenset[str]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """Torque over speed, speed rising; arrays (point,). note: where it comes from; roles: of the columns read."""
+
+    speed_radps: Array
+    torque_nm: Array
+    note: str
+    roles: frozenset[str] = frozenset()
+
+
+def read_points(source: Source, what: str, facts: EngineFacts) -> Points | None:
+    """The points of "fuel" or "nox" (kg/s) or "loss" (W) in a table; None where no column holds it."""
+    table = read_table(source, what)
+    found = [role for role in VALUES_OF[what] if role in table.values]
+    if not found:
+        return None
+    speed, torque = table.values["speed"], _torque_nm(table, "torque", facts)
+    value, powerless = np.full(speed.shape, np.nan), np.zeros(speed.shape, dtype=bool)
+    for role in found:
+        with np.errstate(all="ignore"):  # what overflows is refused below
+            candidate = _value(table, role, what, torque, facts)
+        missing = np.isnan(value)
+        powerless |= missing & np.isnan(candidate) & ~np.isnan(table.values[role])
+        value = np.where(missing, candidate, value)
+    _check_values(table, what, value)
+    known = ~np.isnan(value)
+    if not known.any():
+        raise DataError(
+            f"{table.measured.path}: no point with {what}; {columns_found(table.measured)}"
+        )
+    return Points(
+        speed[known],
+        torque[known],
+        value[known],
+        table.lines[known],
+        table.rectangular,
+        frozenset(table.kinds),
+        (*table.notes, *_left_out(table, what, known, powerless & ~known)),
+    )
+
+
+def read_curve(source: Source, role: str, facts: EngineFacts, *, plain: bool) -> Curve | None:
+    """The "full" or "motoring" curve of a table with a column of speed; None where no column holds it.
+
+    plain: a column that is simply named torque will do.
+    """
+    table = curve_table(source, role, plain=plain)
+    if table is None:
+        return None
+    measured = table.measured
+    torque = _torque_nm(table, role, facts)
+    known = ~np.isnan(torque)
+    speed, first = np.unique(table.values["speed"][known], return_index=True)
+    torque = torque[known]
+    if len(speed) < 2:
+        raise DataError(f"{measured.path}: a {role} curve needs 2 or more speeds")
+    same = np.array([np.ptp(torque[table.values["speed"][known] == s]) == 0 for s in speed])
+    if not same.all():
+        raise DataError(
+            f"{measured.path}: {role} torque has several values at "
+            f"{speed[~same][0] * RPM_PER_RADPS:g} rpm; a curve has one torque at each speed"
+        )
+    note = f"{role} curve from {measured.path.name}: {'; '.join(table.notes)}"
+    return Curve(speed, torque[first], note, frozenset(table.kinds))
+
+
+def _torque_nm(table: Table, role: str, facts: EngineFacts) -> Array:
+    values = table.values[role]
+    if table.kinds[role] == "torque":
+        return values
+    if facts.displacement_m3 is None:
+        raise DataError(
+            f"{table.measured.path}: {role} is a mean pressure, which needs the displacement; give "
+            "--displacement-cm3 or --like"
+        )
+    return values * facts.displacement_m3 / (4 * pi)
+
+
+def _value(table: Table, role: str, what: str, torque_nm: Array, facts: EngineFacts) -> Array:
+    """A value column as flow or loss, NaN where it says nothing."""
+    values, kind = table.values[role], table.kinds[role]
+    power_w = torque_nm * table.values["speed"]
+    driving = np.where(power_w > 0, power_w, np.nan)
+    if kind == "mass flow" or role == "loss":
+        return values
+    if role == "electric":
+        return values - power_w
+    if kind == "specific consumption":
+        return values * driving
+    if kind == "volume flow":
+        return values * _known(
+            table, facts.fuel_density_kgpm3, "a volume flow", "fuel.density_kgpl"
+        )
+    if (values[np.isfinite(values)] > 1).any():
+        raise DataError(
+            f"{table.measured.path}: efficiency up to {np.nanmax(values):g}; allowed: up to 1; where it is in "
+            "per cent, say so in the header, or with --unit efficiency=%"
+        )
+    efficiency = np.where(values > 0, values, np.nan)
+    if what == "loss":
+        moving = np.where(power_w == 0, np.nan, power_w)
+        return np.where(power_w > 0, moving * (1 / efficiency - 1), -moving * (1 - efficiency))
+    heat = _known(table, facts.heating_value_jpkg, "an efficiency", "fuel.heating_value_mjpkg")
+    return driving / efficiency / heat
+
+
+def _known(table: Table, value: float | None, what: str, key: str) -> float:
+    if value is None:
+        raise DataError(
+            f"{table.measured.path}: {what} needs {key}; give --set {key}=VALUE or --like"
+        )
+    return value
+
+
+def _check_values(table: Table, what: str, value: Array) -> None:
+    bad = (value < 0) | np.isinf(value) | (table.values["speed"] < 0)
+    if bad.any():
+        k = np.flatnonzero(bad)[0]
+        raise DataError(
+            f"{table.measured.path}, {runs(sorted(set(table.lines[bad].tolist())))}: {what} or speed below 0, or "
+            f"not finite (first: {what} {value[k]:.4g} in SI); correct the cells"
+        )
+
+
+def _left_out(table: Table, what: str, known: NDArray[np.bool_], powerless: NDArray[np.bool_]):
+    empty = ~known & ~powerless
+    if powerless.any():
+        yield (
+            f"{what}: {powerless.sum()} points left out, {_places(table, powerless)}: without power (torque or "
+            "speed 0, or torque below 0) g/kWh or an efficiency says nothing; give a flow there"
+            if what != "loss"
+            else f"loss: {powerless.sum()} points left out, {_places(table, powerless)}: without power, or at "
+            "efficiency 0, an efficiency says nothing; give the loss there"
+        )
+    if empty.any():
+        yield f"{what}: {empty.sum()} points not measured, {_places(table, empty)}: cells are empty"
+
+
+def _places(table: Table, where: NDArray[np.bool_]) -> str:
+    return runs(sorted(set(table.lines[where].tolist())))

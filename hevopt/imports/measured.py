@@ -1,0 +1,241 @@
+"""Measured tables in whatever shape other tools wrote them: read into columns with units and line numbers.
+
+Text with any usual separator, decimal mark and encoding, .xlsx and .mat. A unit comes from the header, a units row,
+the name's suffix or the convention of a known tool; where none says it, whoever needs it must be told.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.files import printable, shown
+from hevopt.imports.measured_names import base_of, unit_by_convention, unit_in_name
+from hevopt.imports.measured_rows import Table, listed
+from hevopt.units import Unit, unit_named, units_of
+
+Array = NDArray[np.float64]
+
+_BYTES_MAX = 100_000_000
+_COLUMNS_NAMED = 30
+_UNREADABLE = {
+    b"\xd0\xcf\x11\xe0": "an old .xls workbook; save it as .xlsx or CSV",
+    b"%PDF": "a PDF; give the table as CSV or .xlsx",
+    b"\x1f\x8b": "packed with gzip; unpack it first",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Column:
+    """A column of a file, in the file's unit.
+
+    unit: as the file writes it, None where nothing says it; source: how it is known
+    values: (row,) NaN where the cell is empty or no number; strange: (row, text) of the first cells that are no
+    numbers, strange_count of them in all
+    """
+
+    name: str
+    unit: str | None
+    values: Array
+    source: str
+    strange: tuple[tuple[int, str], ...] = ()
+    strange_count: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """A file's table. lines: (row,) line or sheet row of every data row; notes: what was assumed on reading."""
+
+    path: Path
+    columns: tuple[Column, ...]
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quantity:
+    """A column in SI.
+
+    values: (row,); quantity: a key of the unit table; note: the column's name, its unit and how that is known
+    """
+
+    name: str
+    quantity: str
+    values: Array
+    note: str
+
+
+def read_measured(path: Path, *, sheet: str | None = None) -> Measured:
+    """The table of a CSV, TSV, .xlsx or .mat file; DataError where it has none that can be read."""
+    shown_path = Path(printable(str(path)))
+    contents = _contents(path, shown_path)
+    try:
+        table = _table(shown_path, contents, sheet)
+    except MemoryError:
+        raise DataError(
+            f"{shown_path}: too large for this machine's memory; shorten the file"
+        ) from None
+    columns = _columns(shown_path, table)
+    table.lines.flags.writeable = False
+    return Measured(shown_path, tuple(columns), table.lines, tuple(table.notes))
+
+
+def _contents(path: Path, shown_path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise DataError(f"{shown_path}: a folder; give the path of a file")
+        if not path.exists():
+            raise DataError(f"{shown_path}: no such file; check the path")
+        if not path.is_file():
+            raise DataError(f"{shown_path}: not a regular file; give a CSV, .xlsx or .mat file")
+        with path.open("rb") as file:
+            contents = file.read(_BYTES_MAX + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "not a path"
+        raise DataError(f"{shown_path}: cannot be read ({why}); check the path") from None
+    if len(contents) > _BYTES_MAX:
+        raise DataError(
+            f"{shown_path}: more than the {_BYTES_MAX / 1e6:.0f} MB allowed; shorten the file, or use a lower "
+            "sampling rate"
+        )
+    if not contents.strip():
+        raise DataError(f"{shown_path}: empty; a header line and rows of numbers are needed")
+    return contents
+
+
+def _table(path: Path, contents: bytes, sheet: str | None) -> Table:
+    for start, what in _UNREADABLE.items():
+        if contents.startswith(start):
+            raise DataError(f"{path}: {what}")
+    if contents.startswith(b"PK\x03\x04"):
+        from hevopt.imports.measured_excel import excel_table
+
+        return excel_table(path, contents, sheet)
+    if sheet is not None:
+        raise DataError(f"{path}: not an .xlsx workbook; leave --sheet out")
+    if path.suffix.lower() == ".mat" or contents.startswith((b"MATLAB ", b"\x89HDF")):
+        from hevopt.imports.measured_matlab import matlab_table
+
+        return matlab_table(path, contents)
+    from hevopt.imports.measured_text import text_table
+
+    return text_table(path, contents)
+
+
+def _columns(path: Path, table: Table) -> list[Column]:
+    convention = unit_by_convention(table.names, vecto=path.suffix.lower() == ".vdri")
+    columns = []
+    for i, (name, cells) in enumerate(zip(table.names, table.columns, strict=True)):
+        unit, source = unit_in_name(name)
+        if table.units and table.units[i]:
+            unit, source = table.units[i], table.units_source
+        elif name in convention:
+            unit, source = convention[name]
+        strange, count = cells.strange, cells.strange_count
+        values = cells.values()
+        if cells.clock_count and not cells.number_count:
+            unit, source = "s", "dates or times of day"
+        elif cells.clock_count:  # neither a column of numbers nor one of times
+            line, text = cells.found["clock"]
+            strange = [(int(np.searchsorted(table.lines, line)), text), *strange]
+            count += cells.clock_count
+        values.flags.writeable = False
+        columns.append(Column(name, unit, values, source, tuple(strange), count))
+    return columns
+
+
+def column_named(measured: Measured, name: str) -> Column:
+    """The column that a user names: as in the file, without its unit, or by its number from 1."""
+    exact = [c for c in measured.columns if c.name == name]
+    matches = exact or [c for c in measured.columns if base_of(c.name) == base_of(name)]
+    if not matches and name.isdecimal() and 0 < int(name) <= len(measured.columns):
+        matches = [measured.columns[int(name) - 1]]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        raise DataError(
+            f"{measured.path}: {len(matches)} columns are named {shown(name)}; give one by its number, 1 to "
+            f"{len(measured.columns)}"
+        )
+    close = get_close_matches(name, [c.name for c in measured.columns], n=3, cutoff=0.5)
+    hint = f"close matches: {', '.join(close)}; " if close else ""
+    raise DataError(f"{measured.path}: no column {shown(name)}; {hint}{columns_found(measured)}")
+
+
+def column_of(measured: Measured, aliases: Collection[str], option: str) -> Column | None:
+    """The one column whose name without unit is an alias, written in small letters and digits alone.
+
+    None where there is none; DataError where there are several, between which the option chooses.
+    """
+    found = [c for c in measured.columns if base_of(c.name) in aliases]
+    if len(found) > 1:
+        names = ", ".join(c.name for c in found)
+        raise DataError(
+            f"{measured.path}: columns {names} could all be meant; choose with {option}"
+        )
+    return found[0] if found else None
+
+
+def columns_found(measured: Measured) -> str:
+    """The columns of a file with their units, for a message."""
+    named = [
+        f"{c.name} [{c.unit}]" if c.unit and c.unit not in c.name else c.name
+        for c in measured.columns
+    ]
+    more = f" and {len(named) - _COLUMNS_NAMED} more" if len(named) > _COLUMNS_NAMED else ""
+    return f"columns found: {', '.join(named[:_COLUMNS_NAMED])}{more}"
+
+
+def in_si(
+    measured: Measured,
+    column: Column,
+    allowed: Sequence[str],
+    option: str,
+    unit: str | None = None,
+    *,
+    text_as_empty: bool = False,
+) -> Quantity:
+    """A column in SI by its unit, or by `unit` where the user gives one with the option.
+
+    allowed: quantities of the unit table that will do, such as "speed"; DataError for a missing or other unit, and
+    for cells that are no numbers unless those count as empty.
+    """
+    given, source = (unit, option) if unit is not None else (column.unit, column.source)
+    known = known_unit(measured, column, given, allowed, option)
+    if column.strange and not text_as_empty:
+        faults = [f"line {measured.lines[row]}: {shown(text)}" for row, text in column.strange]
+        more = column.strange_count - len(faults)
+        raise DataError(
+            f"{measured.path}: column {column.name}: {listed(faults)}{f' and {more} more' * (more > 0)}: not "
+            "usable numbers; correct these cells, or empty them"
+        )
+    if unit is not None and column.unit is not None and unit_named(column.unit) != known:
+        source += f", against {column.unit} in the file"
+    values = column.values * known.si
+    values.flags.writeable = False
+    note = f"{column.name} in {known.symbol} ({source})"
+    return Quantity(column.name, known.quantity, values, note)
+
+
+def known_unit(
+    measured: Measured, column: Column, given: str | None, allowed: Sequence[str], option: str
+) -> Unit:
+    """The unit with a text, if it measures one of the allowed quantities."""
+    choices = ", ".join(symbol for quantity in allowed for symbol in units_of(quantity))
+    if given is None:
+        raise DataError(
+            f"{measured.path}: the unit of column {column.name} is not in the file; give it with {option}, "
+            f"or in the header, such as {column.name} [{units_of(allowed[0])[0]}]; known: {choices}"
+        )
+    known = unit_named(given)
+    if known is None or known.quantity not in allowed:
+        what = "is unknown" if known is None else f"is one of {known.quantity}"
+        raise DataError(
+            f"{measured.path}: column {column.name}: unit {shown(given)} {what}; needed is {' or '.join(allowed)}; "
+            f"known: {choices}; correct the header, or give the unit with {option}"
+        )
+    return known

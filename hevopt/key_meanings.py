@@ -1,0 +1,178 @@
+"""What every key of architecture and component files means, and its unit; "" where it has none.
+
+Model of architecture_files.py -> key -> (unit, meaning). A test keeps it complete.
+"""
+
+_NAME = ("", "name shown in tables and messages")
+_CELLS_NAN = "rows are speeds, columns torques, nan where not measured"
+_ONE_FACTOR = "the factor k; give only one of its names, speeds unchanged they are the same"
+
+MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
+    "ArchitectureFile": {
+        "name": _NAME,
+        "description": ("", "one line about the architecture, shown in the list"),
+        "car": ("", "car without powertrain"),
+        "engine": ("", "combustion engine"),
+        "gearbox": ("", "gearbox with final drive and shift speeds"),
+        "machine": ("", "electric machine with its inverter"),
+        "battery": ("", "battery"),
+        "hybrid_mass_kg": ("kg", "mass that the architecture adds to the car's"),
+        "functions": ("", "what the hybrid may do; what is left out is forbidden to every strategy"),
+        "gear": ("", 'who chooses the engine\'s gear: the cycle (or shift speeds), or "free": the strategy'),
+        "coupling": ("", "how the machine joins the shafts"),
+    },
+    "CouplingFile": {
+        "kind": ("", "where the machine sits: none (alternator), belt (on the engine), crankshaft, gearbox "
+                 "input, gearbox output, or the even shaft of a dual clutch gearbox"),
+        "second_clutch": ("", "a clutch between engine and machine, so that electric driving does not drag "
+                          "the engine; kind gearbox_input only"),
+        "machine_ratio": ("-", "machine speed over gearbox output speed; kind gearbox_output only"),
+        "machine_efficiency": ("-", "efficiency of the machine's own gear; kind gearbox_output only"),
+        "disconnects_above_speed_max": ("", "the machine is uncoupled above its highest speed instead of "
+                                        "limiting the car; kind gearbox_output only"),
+        "machine_shift_fuel_g": ("g", "fuel that a change of the machine's gear counts; kind even_shaft only"),
+    },
+    "CarFile": {
+        "name": _NAME,
+        "mass_kg": ("kg", "mass as driven, without the parts that an architecture adds"),
+        "tyre_radius_m": ("m", "rolling radius of the driven wheels"),
+        "wheel_inertia_kgm2": ("kg m²", "moment of inertia of all wheels together"),
+        "auxiliary_power_w": ("W", "electric load of the on-board network, constant"),
+        "road_load": ("", "rolling and air resistance in parts, or coast-down coefficients"),
+    },
+    "RoadLoadFile": {
+        "rolling_c0": ("-", "rolling resistance over weight at standstill"),
+        "rolling_c1_spm": ("s/m", "rise of rolling resistance over weight with speed"),
+        "rolling_c2_s2pm2": ("s²/m²", "the same with the square of speed"),
+        "rolling_c3_s3pm3": ("s³/m³", "the same with the cube of speed"),
+        "drag_area_m2": ("m²", "drag coefficient times frontal area"),
+        "air_density_kgpm3": ("kg/m³", "density of the air"),
+        "coastdown_c0_n": ("N", "C0 of the coast-down force C0 + C1 v + C2 v²"),
+        "coastdown_c1_nspm": ("N s/m", "C1 of the coast-down force"),
+        "coastdown_c2_ns2pm2": ("N s²/m²", "C2 of the coast-down force"),
+    },
+    "EngineFile": {
+        "name": _NAME,
+        "displacement_cm3": ("cm³", "swept volume of all cylinders"),
+        "bore_mm": ("mm", "bore of a cylinder; for the record"),
+        "stroke_mm": ("mm", "stroke; sets the mean piston speed of fuel_coefficients"),
+        "idle_rpm": ("1/min", "idle speed, held by a slipping clutch when the car is slower"),
+        "inertia_kgm2": ("kg m²", "moment of inertia of crankshaft, flywheel and clutch cover"),
+        "start_fuel_g": ("g", "fuel burnt by one start"),
+        "fuel": ("", "what is burnt"),
+        "full_load": ("", "highest torque over speed; its ends are the lowest and highest engine speed"),
+        "fuel_coefficients": ("", "fuel by p_me = (a + b cm + c cm²) p_mf + a2 p_mf² + l + l2 cm², brake and "
+                              "fuel mean pressure in bar, mean piston speed cm in m/s; or fuel_map"),
+        "fuel_map": ("", "measured fuel, NOx and motoring torque; or fuel_coefficients"),
+        "nox_coefficients": ("", "NOx in mg per litre of displacement and working cycle: "
+                             "m0 + BS p_me (n/2000)^0.19 / 36, n in 1/min, p_me in bar, brake-specific "
+                             "BS = lo + (hi - lo) / (1 + exp(-(p_me - p0 - p1 (n/1000 - 2)) / dp)) in g/kWh"),
+        "scale": ("", "another size of the same engine by one factor k: at equal speed torque, power, fuel, NOx, "
+                  "drag, displacement, inertia and the fuel of a start are k times as large; stroke, speeds and "
+                  "mean pressures stay (Willans scaling)"),
+    },
+    "EngineScaleFile": {
+        "displacement": ("-", _ONE_FACTOR),
+        "torque": ("-", _ONE_FACTOR),
+        "power": ("-", _ONE_FACTOR),
+    },
+    "FuelFile": {
+        "heating_value_mjpkg": ("MJ/kg", "lower heating value"),
+        "density_kgpl": ("kg/l", "density"),
+        "co2_kgpkg": ("kg/kg", "mass of CO2 per mass of fuel burnt"),
+    },
+    "FullLoadFile": {
+        "speed_rpm": ("1/min", "speeds of the curve, increasing"),
+        "torque_nm": ("Nm", "highest torque at each of them"),
+    },
+    "FuelCoefficientsFile": {
+        "a": ("-", "share of fuel mean pressure that becomes work"),
+        "b": ("s/m", "its change with piston speed"),
+        "c": ("s²/m²", "its change with the square of piston speed"),
+        "a2": ("1/bar", "its fall with fuel mean pressure"),
+        "l": ("bar", "mean pressure of friction and pumping, negative"),
+        "l2": ("bar s²/m²", "its change with the square of piston speed"),
+    },
+    "EngineGridFile": {
+        "speed_rpm": ("1/min", "speeds of the rows, increasing"),
+        "torque_nm": ("Nm", "torques of the columns, increasing"),
+        "fuel_gps": ("g/s", f"fuel flow; {_CELLS_NAN}"),
+        "nox_gps": ("g/s", f"NOx flow; {_CELLS_NAN}"),
+        "motoring_torque_nm": ("Nm", "torque of the turning engine without fuel at each speed, negative"),
+    },
+    "NoxCoefficientsFile": {
+        "m0": ("mg/l", "NOx without load, per litre and working cycle"),
+        "lo": ("g/kWh", "brake-specific NOx at low load"),
+        "hi": ("g/kWh", "brake-specific NOx at high load"),
+        "p0": ("bar", "mean pressure half-way between the two, at 2000/min"),
+        "p1": ("bar", "its change per 1000/min"),
+        "dp": ("bar", "width of the rise"),
+    },
+    "GearboxFile": {
+        "name": _NAME,
+        "ratios": ("-", "input speed over output speed of each gear, first gear first, falling"),
+        "final_drive_ratio": ("-", "gearbox output speed over wheel speed"),
+        "efficiency": ("-", "of gearbox and final drive together: one for all gears, or one per gear"),
+        "shift_speeds": ("", "when the driver changes gear, on cycles that list none"),
+        "free_gear": ("", "limits of a gear that the strategy chooses"),
+    },
+    "ShiftSpeedsFile": {
+        "up_kmh": ("km/h", "speed above which each gear but the last is left for the next"),
+        "down_kmh": ("km/h", "speed below which the next is left again, each below its up_kmh"),
+        "engage_before_launch_s": ("s", "how long first gear is engaged before moving off"),
+    },
+    "FreeGearFile": {
+        "shift_fuel_g": ("g", "fuel that a change of gear counts"),
+        "engine_speed_min_rpm": ("1/min", "lowest engine speed above first gear"),
+    },
+    "MachineFile": {
+        "name": _NAME,
+        "kind": ("", "the loss of machine and inverter is given by coefficients (loss), one efficiency, or a map"),
+        "power_max_w": ("W", "highest mechanical power, either direction"),
+        "torque_max_nm": ("Nm", "highest torque, either direction; without it only power limits"),
+        "speed_max_rpm": ("1/min", "highest speed; without it none"),
+        "inertia_kgm2": ("kg m²", "moment of inertia of the rotor"),
+        "efficiency": ("-", "mechanical to electric and back; kind efficiency only"),
+        "loss_c0_w": ("W", "c0 of loss = c0 + c1 w + c2 w² + c3 T², w in rad/s, T in Nm; kind loss only"),
+        "loss_c1_ws": ("W s", "c1 of the loss"),
+        "loss_c2_ws2": ("W s²", "c2 of the loss"),
+        "loss_c3_wpnm2": ("W/(Nm)²", "c3 of the loss"),
+        "loss_map": ("", "measured loss of machine and inverter; kind map only"),
+        "scale": ("", "another size of the same machine by one factor k: at equal speed torque, power, loss and "
+                  "inertia are k times as large, loss(k T) = k loss(T); speeds stay (active length)"),
+    },
+    "ScaleFile": {
+        "torque": ("-", _ONE_FACTOR),
+        "power": ("-", _ONE_FACTOR),
+    },
+    "LossMapFile": {
+        "speed_rpm": ("1/min", "speeds of the rows, increasing"),
+        "torque_nm": ("Nm", "torques of the columns, increasing, of both signs unless symmetric"),
+        "loss_w": ("W", f"loss of machine and inverter; {_CELLS_NAN}"),
+        "symmetric": ("", "torques from 0 up are listed, and the opposite torque loses the same"),
+    },
+    "BatteryFile": {
+        "name": _NAME,
+        "cells_in_series": ("-", "number of cells; all other figures are those of one"),
+        "capacity_ah": ("Ah", "charge of a cell"),
+        "open_circuit_v": ("V", "of a cell: { intercept, slope } over state of charge, or a list over curve_soc"),
+        "resistance_ohm": ("Ω", "of a cell, either direction: one value, or a list over curve_soc"),
+        "discharge_ohm": ("Ω", "of a cell while discharging: one value, or a list over curve_soc"),
+        "charge_ohm": ("Ω", "of a cell while charging: one value, or a list over curve_soc"),
+        "curve_soc": ("-", "states of charge of the lists, increasing"),
+        "coulombic_efficiency": ("-", "share of the charging current that is stored"),
+        "power_max_w": ("W", "highest power of a cell, either direction; without it voltage and current limit"),
+        "current_max_a": ("A", "highest current, either direction"),
+        "soc": ("", "state of charge: start, window, end"),
+    },
+    "LinearVoltageFile": {
+        "intercept": ("V", "open-circuit voltage of a cell at state of charge 0"),
+        "slope": ("V", "its rise from there to state of charge 1"),
+    },
+    "SocFile": {
+        "start": ("-", "state of charge at the start"),
+        "min": ("-", "lower end of the window"),
+        "max": ("-", "upper end of the window"),
+        "end": ("-", "least state of charge at the end; without it that of the start (charge neutral)"),
+    },
+}  # fmt: skip
