@@ -1,5 +1,6 @@
 """Where a result comes from: digests of inputs and of the code that computes, versions of what it runs on."""
 
+import ast
 import hashlib
 import json
 import platform
@@ -13,16 +14,27 @@ from hevopt import __version__
 from hevopt.architecture import Architecture
 from hevopt.cycle import Cycle
 
+# Whole numbers up to here are floats without loss.
+_EXACT_MAX = 2**53
 _PACKAGE = Path(__file__).resolve().parent
-# What prints, draws or stores results, and cannot change one.
-_NOT_PHYSICS = ("commands", "pages", "cli.py", "report.py", "writing.py", "published.py")
+# Every result comes out of these; what they import, and nothing else, can change one.
+_ROOTS = ("study", "sweeps.work")
 _LIBRARIES = ("numpy", "scipy", "numba", "cvxpy", "clarabel", "osqp")
 
 
 def digest(value: Any) -> str:
-    """SHA-256 of nested tables and values, whatever the order of keys; floats count to the last bit."""
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"))
+    """SHA-256 of nested tables and values, whatever the order of keys; numbers count to the last bit."""
+    text = json.dumps(_floats(value), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _floats(value: Any) -> Any:
+    """The value with whole numbers as floats: 8000 and 8000.0 are one."""
+    if isinstance(value, Mapping):
+        return {key: _floats(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_floats(inner) for inner in value]
+    return float(value) if type(value) is int and abs(value) <= _EXACT_MAX else value
 
 
 def cycle_contents(cycle: Cycle) -> dict[str, Any]:
@@ -36,11 +48,36 @@ def cycle_contents(cycle: Cycle) -> dict[str, Any]:
 def physics_digest() -> str:
     """SHA-256 of the source of every module that can change a result."""
     found = hashlib.sha256()
-    for path in sorted(_PACKAGE.glob("**/*.py")):
-        if path.relative_to(_PACKAGE).parts[0] not in _NOT_PHYSICS:
-            found.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0")
-            found.update(path.read_bytes())
+    for path in sorted(_reached()):
+        found.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0")
+        found.update(path.read_bytes())
     return found.hexdigest()
+
+
+def _reached() -> set[Path]:
+    """The source files of the package that are imported, at whatever distance, for a result."""
+    waiting = [file for root in _ROOTS for file in _files_of(root)]
+    reached: set[Path] = set()
+    while waiting:
+        path = waiting.pop()
+        if path in reached:
+            continue
+        reached.add(path)
+        for node in ast.walk(ast.parse(path.read_bytes())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hevopt"):
+                module = node.module.removeprefix("hevopt").removeprefix(".")
+                names = (f"{module}.{alias.name}".strip(".") for alias in node.names)
+                waiting += [file for name in (module, *names) for file in _files_of(name)]
+    return reached
+
+
+def _files_of(module: str) -> list[Path]:
+    """The file of a module below the package; all files of one that is a folder."""
+    place = _PACKAGE.joinpath(*module.split("."))
+    if module and place.is_dir():
+        return sorted(place.glob("*.py"))
+    file = place.with_suffix(".py")
+    return [file] if module and file.is_file() else []
 
 
 @cache
@@ -50,10 +87,13 @@ def versions() -> dict[str, str]:
     return {"hevopt": __version__, "python": platform.python_version()} | names
 
 
-def files_digests(cars: Iterable[Architecture], cycles: Iterable[Cycle]) -> Mapping[str, str]:
-    """File as read -> SHA-256 of its bytes, of all files behind some cars and cycles."""
+def files_digests(
+    cars: Iterable[Architecture], cycles: Iterable[Cycle], others: Iterable[Path] = ()
+) -> Mapping[str, str]:
+    """File as read -> SHA-256 of its bytes, of all files behind some cars and cycles, and others."""
     paths = [path for car in cars for path in car.files]
     paths += [cycle.source for cycle in cycles if cycle.source is not None]
+    paths += others
     return {
         str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in dict.fromkeys(paths)
     }

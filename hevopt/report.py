@@ -1,8 +1,6 @@
-"""Everything hevopt writes: tables for the terminal, JSON, trajectories as CSV, control tables as .npz."""
+"""Tables for the terminal, the page of strategies, control tables as .npz."""
 
-import csv
 import io
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.problem import Plan, Problem, Trajectory
+from hevopt.problem import Plan, Problem
 from hevopt.published import published_beside
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison, Row
@@ -124,12 +122,6 @@ def published_table(comparison: Comparison) -> Table | None:
     return table
 
 
-def comparison_json(comparison: Comparison) -> str:
-    """One object {"cycle", "rows"}; null where a figure does not exist."""
-    rows = [row.as_dict() for row in comparison.rows]
-    return json.dumps({"cycle": comparison.cycle, "rows": rows}, indent=1, allow_nan=False)
-
-
 def strategies_page(comparisons: Sequence[Comparison], steps: Mapping[str, int]) -> str:
     """Markdown: what each strategy knows, what a step costs to run, what it loses against the bound.
 
@@ -203,48 +195,6 @@ def calibration_table(plan: Plan) -> Table | None:
     return table
 
 
-def write_trajectory(path: Path, problem: Problem, trajectory: Trajectory) -> None:
-    """A CSV line per step: inputs, controls, every power and loss, units in the column names."""
-    columns = trajectory_columns(problem, trajectory)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    for values in zip(*columns.values(), strict=True):
-        writer.writerow([_plain(value) for value in values])
-    write_whole(path, text.getvalue().encode())
-
-
-def trajectory_columns(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
-    """Column name to (time,) values of a trajectory."""
-    table = problem.table
-    labels = [table.controls[c] for c in trajectory.control]
-    columns: dict[str, Any] = {"time_s": table.time_s, "step_s": table.step_s}
-    if table.signals is not None:
-        columns["speed_mps"] = table.signals.speed_mps
-        columns["gear"] = table.signals.gear
-        columns["clutch_open"] = table.signals.clutch_open.astype(int)
-    columns |= {
-        "engine_on": [int(label.engine_on) for label in labels],
-        "machine_gear": [label.machine_gear for label in labels],
-        "engine_gear_chosen": [label.engine_gear for label in labels],
-        "level": [label.level for label in labels],
-        "soc": trajectory.soc[:-1],
-        "soc_after": trajectory.soc[1:],
-        "energy_j": trajectory.energy_j[:-1],
-        "fuel_kg": trajectory.fuel_kg,
-        "switch_fuel_kg": trajectory.switch_fuel_kg,
-        "nox_kg": trajectory.nox_kg,
-        "battery_power_w": trajectory.battery_power_w,
-    }
-    columns |= trajectory.flows
-    if table.missing_torque_nm is not None:
-        columns["missing_torque_nm"] = table.missing_torque_nm
-    residuals = {
-        f"residual_{name.replace(' ', '_')}_w": r for name, r in trajectory.residuals.items()
-    }
-    return columns | residuals
-
-
 def write_table(path: Path, problem: Problem) -> None:
     """The problem as .npz arrays, enough for another solver to repeat ours; documented in its README entry."""
     table, pack = problem.table, problem.battery
@@ -268,7 +218,3 @@ def write_table(path: Path, problem: Problem) -> None:
         battery_coulombic_efficiency=pack.coulombic_efficiency,
     )  # fmt: skip
     write_whole(path, contents.getvalue())
-
-
-def _plain(value: Any) -> Any:
-    return repr(float(value)) if isinstance(value, float | np.floating) else value

@@ -1,26 +1,34 @@
 """Options that several commands take, with one help text each."""
 
-from typing import Annotated
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
-CycleOption = Annotated[str, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
+CycleOption = Annotated[str | None, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
 NoxOption = Annotated[
-    float,
+    float | None,
     typer.Option("--nox-weight", help="kg of fuel that a kg of NOx counts (ecms, dp, bound)."),
 ]
 ShortfallOption = Annotated[
-    bool,
+    bool | None,
     typer.Option(
-        "--allow-shortfall", help="Drive on where the car cannot follow, and mark the rows."
+        "--allow-shortfall/--no-allow-shortfall",
+        help="Drive on where the car cannot follow, and mark the rows.",
     ),
 ]
 GearOption = Annotated[
-    bool, typer.Option("--free-gear", help="The engine's gear is a control, not the cycle's.")
+    bool | None,
+    typer.Option(
+        "--free-gear/--no-free-gear", help="The engine's gear is a control, not the cycle's."
+    ),
 ]
 RefineOption = Annotated[
-    bool,
-    typer.Option("--refine", help="Add torque levels around dp's plan until its cost settles."),
+    bool | None,
+    typer.Option(
+        "--refine/--no-refine", help="Add torque levels around dp's plan until its cost settles."
+    ),
 ]
 HorizonOption = Annotated[
     float | None,
@@ -28,3 +36,73 @@ HorizonOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead.")]
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
+
+
+def _number(option: str, text: str) -> Any:
+    return Annotated[float | None, typer.Option(option, help=text)]
+
+
+# Setting of a study file -> its option.
+SETTINGS: dict[str, Any] = {
+    "nox_weight": NoxOption,
+    "allow_shortfall": ShortfallOption,
+    "free_gear": GearOption,
+    "soc_start": _number("--soc-start", "State of charge at the start, 0 to 1."),
+    "soc_min": _number("--soc-min", "Lower end of the window of the state of charge."),
+    "soc_max": _number("--soc-max", "Upper end of that window."),
+    "soc_end": Annotated[
+        str | None,
+        typer.Option("--soc-end", help="Least state of charge at the end: neutral, or 0 to 1."),
+    ],
+    "auxiliaries_w": _number("--auxiliaries", "Electric load of the on-board network, W."),
+    "mass_kg": _number("--mass", "Mass of the car without the parts of the hybrid, kg."),
+    "start_cost_g": _number("--start-cost", "Fuel of one engine start, g."),
+    "shift_cost_g": _number("--shift-cost", "Fuel that a change of a free gear counts, g."),
+    "set": Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Any key of the architecture or of a component by its path, the value as in TOML, such as "
+            "machine.power_max_w=2e4 or engine.scale.displacement=1.25; can be repeated.",
+        ),
+    ],
+}
+
+
+def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option for every setting in place of its parameter `given`, a dict of those given."""
+    own = inspect.signature(command, eval_str=True).parameters
+    parameters = []
+    for parameter in own.values():
+        kind = inspect.Parameter.KEYWORD_ONLY
+        if parameter.name == "given":
+            parameters += [
+                inspect.Parameter(name, kind, default=None, annotation=option)
+                for name, option in SETTINGS.items()
+            ]
+        else:
+            parameters.append(parameter.replace(kind=kind))
+
+    def with_options(**values: Any) -> None:
+        given = {name: value for name in SETTINGS if (value := values.pop(name)) is not None}
+        command(given=_as_in_a_file(given), **values)
+
+    with_options.__name__, with_options.__doc__ = command.__name__, command.__doc__
+    with_options.__signature__ = inspect.Signature(parameters)
+    with_options.__annotations__ = {p.name: p.annotation for p in parameters}
+    return with_options
+
+
+def _as_in_a_file(given: dict[str, Any]) -> dict[str, Any]:
+    from hevopt.study_file import assignments
+
+    values = dict(given)
+    if "set" in values:
+        values["set"] = assignments(values["set"])
+    if "soc_end" in values:
+        try:
+            values["soc_end"] = float(values["soc_end"])
+        except ValueError:
+            pass  # a word, which is checked with the others
+    return values
