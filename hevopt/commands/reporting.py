@@ -1,0 +1,82 @@
+"""`hevopt report`: the page of saved results; and the files that `hevopt compare` leaves behind."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hevopt.commands.terminal import check_out, write
+from hevopt.errors import DataError
+
+if TYPE_CHECKING:
+    from hevopt.pages.results import Results
+
+_SQLITE = b"SQLite format 3\0"
+
+
+def report(
+    file: Annotated[
+        Path, typer.Argument(help="What hevopt compare --save wrote, or the store of a sweep.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="The HTML page to write.")],
+) -> None:
+    """Write the page of saved results: one HTML file that opens offline."""
+    from hevopt.writing import check_writable, write_whole
+
+    target = check_writable(out)
+    if file.exists() and target.exists() and target.samefile(file):
+        raise DataError(f"--out {out} is the file that the results are read from; choose another")
+    write_whole(out, _page(file).encode())
+    write(f"written to {out}")
+
+
+def _page(file: Path) -> str:
+    """The page of a saved comparison, or of a sweep where the file is an SQLite database."""
+    try:
+        with file.open("rb") as opened:
+            is_store = opened.read(len(_SQLITE)) == _SQLITE
+    except OSError:
+        is_store = False  # what is wrong with the file is for its reader to say
+    if is_store:
+        from hevopt.pages.sweep import sweep_page
+        from hevopt.pages.sweep_data import load_sweep
+
+        return sweep_page(load_sweep(file))
+    from hevopt.pages.comparison import comparison_page
+    from hevopt.pages.results import load_results
+
+    return comparison_page(load_results(file))
+
+
+def check_files(
+    page: Path | None, saved: Path | None, architectures: list[str], cycle: str
+) -> None:
+    """DataError, before anything is solved, where a file cannot be written or is one of the inputs."""
+    for option, out in (("--report", page), ("--save", saved)):
+        for architecture in architectures:
+            if out is not None:
+                check_out(out, architecture, cycle, option)
+    if page is not None and saved is not None and page.resolve() == saved.resolve():
+        raise DataError(f"--report and --save name one file, {page}; choose two")
+
+
+def write_files(results: "Results", page: Path | None, saved: Path | None) -> list[str]:
+    """Write the page and the saved results, each where asked for; a line for each."""
+    from hevopt.pages.comparison import comparison_page
+    from hevopt.writing import write_whole
+
+    contents = []
+    if page is not None:
+        contents.append(("report", page, comparison_page(results).encode()))
+    if saved is not None:
+        contents.append(("results", saved, results.packed()))
+    for _, path, whole in contents:
+        write_whole(path, whole)
+    return [f"{what} written to {path}" for what, path, _ in contents]
+
+
+def command_line() -> str:
+    """The command as it was given, quoted for a shell."""
+    return shlex.join(["hevopt", *sys.argv[1:]])

@@ -1,0 +1,321 @@
+"""The saved form of a comparison: JSON, compressed with gzip, from which its page can be made again.
+
+Rows hold every figure at full precision; traces and maps are rounded, see `collect.py`.
+"""
+
+import gzip
+import json
+import zlib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from hevopt.datafile import FileModel
+from hevopt.errors import DataError
+from hevopt.files import printable
+
+FORMAT = "hevopt comparison 1"
+_MEGABYTES_MAX = 500
+_MAGIC = b"\x1f\x8b"
+_FAULTS_LISTED = 5
+
+
+class RowFigures(FileModel):
+    """The figures of `study.Row`."""
+
+    architecture: str
+    strategy: str
+    status: str
+    fuel_l_per_100km: float | None
+    delta_fuel_percent: float | None
+    co2_g_per_km: float | None
+    nox_mg_per_km: float | None
+    delta_nox_percent: float | None
+    soc_start: float | None
+    soc_end: float | None
+    delta_energy_percent: float | None
+    fuel_corrected_l_per_100km: float | None
+    engine_starts: int | None
+    bound_l_per_100km: float | None
+    gap_percent: float | None
+    certificate: str | None
+    solve_s: float | None
+
+
+class MapFigures(FileModel):
+    """A component over (speed, torque); None where it cannot be used or the figure has no meaning.
+
+    efficiency: of the engine, or of the machine in the direction of its power
+    nox_kgpj: NOx per work, of engines only; limit_nm: largest torque over speed; least_nm: lowest
+    """
+
+    name: str
+    speed_radps: list[float]
+    torque_nm: list[float]
+    efficiency: list[list[float | None]]
+    nox_kgpj: list[list[float | None]] | None
+    limit_nm: list[float]
+    least_nm: list[float]
+
+
+class CarFigures(FileModel):
+    """What the rows of one architecture share; lists are (time,).
+
+    price_kgpj: what a joule of end charge is worth, from the certificate; certified_gap_percent: how far dynamic
+    programming's rollout lies above the bound, the certificate's own looseness at most
+    """
+
+    name: str
+    description: str
+    time_s: list[float]
+    step_s: list[float]
+    speed_mps: list[float]
+    wheel_power_w: list[float]
+    gear: list[int]
+    missing_torque_nm: list[float]
+    soc_min: float
+    soc_max: float
+    heating_value_jpkg: float
+    price_kgpj: float
+    certified_gap_percent: float | None
+    engine: MapFigures
+    machine: MapFigures
+
+
+class Trace(FileModel):
+    """What a row does, (time,), but soc: (time + 1,). operation: index into the names of `operations`."""
+
+    soc: list[float]
+    operation: list[int]
+    engine_on: list[int]
+    engine_gear: list[int]
+    machine_gear: list[int]
+    fuel_kg: list[float]
+    nox_kg: list[float]
+    battery_power_w: list[float]
+    engine_torque_nm: list[float]
+    engine_speed_radps: list[float]
+    machine_torque_nm: list[float]
+    machine_speed_radps: list[float]
+    brake_power_w: list[float]
+
+
+class Link(FileModel):
+    """Energy that goes from one place to another over the whole cycle."""
+
+    source: str
+    target: str
+    energy_j: float
+
+
+class Item(FileModel):
+    """One entry of the energy balance."""
+
+    name: str
+    energy_j: float
+
+
+class Energy(FileModel):
+    """Where the energy of a cycle comes from and where it stays: sum(taken) = sum(spent) + residual_j.
+
+    links: the same, and what flows in between; of_which: shares of entries, for reading, in no sum
+    """
+
+    links: list[Link]
+    taken: list[Item]
+    spent: list[Item]
+    residual_j: float
+    of_which: list[Item]
+
+
+class Share(FileModel):
+    """What one mode of operation takes of a cycle."""
+
+    operation: str
+    time_s: float
+    distance_m: float
+    fuel_kg: float
+    nox_kg: float
+
+
+class Member(FileModel):
+    """One member of a rule family: thresholds, and what comes of them."""
+
+    threshold_w: float
+    nox_cap_kgps: float | None = None
+    fuel_l_per_100km: float
+    corrected_l_per_100km: float
+    nox_mg_per_km: float
+    surplus_j: float
+    neutral: bool
+    chosen: bool
+
+
+class Detail(FileModel):
+    """All of a row beyond its figures. limits: name of a limit -> steps within 1 % of it.
+
+    engine_on_s, engine_off_s: lengths of the spells; equivalence_kgpj: the strategy's own price, if it has one
+    solver: what a solver reports as trouble
+    """
+
+    trace: Trace
+    energy: Energy
+    shares: list[Share]
+    limits: dict[str, int]
+    engine_on_s: list[float]
+    engine_off_s: list[float]
+    equivalence_kgpj: float | None
+    calibration: list[Member]
+    solver: list[str]
+
+
+class Row(FileModel):
+    """A row with its detail; None where the case failed."""
+
+    figures: RowFigures
+    detail: Detail | None
+
+
+class PublishedFigure(FileModel):
+    """One published statement, ours beside it, and what differs."""
+
+    what: str
+    published: str
+    ours: str
+    differs: str
+
+
+class ParetoPoint(FileModel):
+    """A plan on the front, with the weights on NOx for which none found is better; see `pareto.figures_of`."""
+
+    nox_weight: float
+    nox_weights: list[float]
+    strategy: str
+    fuel_l_per_100km: float
+    nox_mg_per_km: float
+    bound_l_per_100km: float
+    gap_percent: float | None
+    certificate: str
+
+
+class Corner(FileModel):
+    """A corner of the outer front."""
+
+    nox_mg_per_km: float
+    fuel_l_per_100km: float
+
+
+class ParetoFront(FileModel):
+    """The front of one architecture: plans from least fuel to least NOx, and the proven outer front."""
+
+    architecture: str
+    cycle: str
+    points: list[ParetoPoint]
+    outer: list[Corner]
+    gap_percent: float
+
+
+class Sensitivity(FileModel):
+    """How a result moves with one parameter; see `sensitivity.Effect`."""
+
+    architecture: str
+    strategy: str
+    parameter: str
+    unit: str
+    values: list[float]
+    fuel_l_per_100km: list[float]
+    delta_percent: list[float]
+    nox_mg_per_km: list[float]
+    delta_nox_percent: list[float | None]
+    elasticity: float | None
+    elasticity_nox: float | None
+
+
+class Results(FileModel):
+    """A comparison as it is saved.
+
+    changes: what of the cars' files was changed, line by line
+    inputs: file -> SHA-256; versions: name -> version; failures: architecture, or it and strategy -> message
+    """
+
+    format: Literal["hevopt comparison 1"] = FORMAT
+    cycle: str
+    distance_m: float
+    reference: str | None
+    nox_weight: float
+    free_gear: bool
+    command: str
+    changes: list[str]
+    inputs: dict[str, str]
+    versions: dict[str, str]
+    operations: list[str]
+    causal: list[str]
+    cars: dict[str, CarFigures]
+    rows: list[Row]
+    failures: dict[str, str]
+    published: list[PublishedFigure]
+    pareto: list[ParetoFront] | None = None
+    sensitivity: list[Sensitivity] | None = None
+
+    def packed(self) -> bytes:
+        """The contents of the file; the same results give the same bytes."""
+        text = json.dumps(self.model_dump(), allow_nan=False, separators=(",", ":"))
+        return gzip.compress(text.encode(), compresslevel=6, mtime=0)
+
+
+def load_results(path: Path) -> Results:
+    """Results from a saved file; DataError says what is wrong with it."""
+    try:
+        results = Results.model_validate(_contents(path))
+        faults = _disagreements(results)
+    except ValidationError as error:
+        results = None
+        faults = [
+            f"{printable('.'.join(map(str, fault['loc'])))[:120]}: {fault['msg'].lower()}"
+            for fault in error.errors(include_input=False, include_url=False)
+        ]
+    if results is None or faults:
+        raise DataError(
+            f"{path}: not a saved comparison ({'; '.join(faults[:_FAULTS_LISTED])}); give a file written by "
+            "hevopt compare --save"
+        )
+    return results
+
+
+def _disagreements(results: Results) -> list[str]:
+    """Rows whose car is missing, and traces that are not as long as their cycle."""
+    faults = []
+    for n, row in enumerate(results.rows):
+        if row.detail is None:
+            continue
+        car = results.cars.get(row.figures.architecture)
+        if car is None:
+            faults.append(f"rows.{n}: no car {printable(row.figures.architecture)!r}")
+            continue
+        steps, trace = len(car.time_s), row.detail.trace.model_dump()
+        lengths = {len(values) - (name == "soc") for name, values in trace.items()}
+        if lengths != {steps} or max(trace["operation"], default=0) >= len(results.operations):
+            faults.append(f"rows.{n}.detail.trace: not of {steps} steps, as car {car.name} has")
+    return faults
+
+
+def _contents(path: Path) -> Any:
+    advice = "give a file written by hevopt compare --save"
+    try:
+        packed = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    try:
+        unpacker = zlib.decompressobj(wbits=31)
+        text = packed
+        if packed.startswith(_MAGIC):
+            text = unpacker.decompress(packed, _MEGABYTES_MAX * 1_000_000)
+            if not unpacker.eof:
+                raise DataError(f"{path}: cut short, or beyond {_MEGABYTES_MAX} MB; {advice}")
+        contents = json.loads(text)
+    except (zlib.error, ValueError, RecursionError):
+        raise DataError(f"{path}: neither JSON nor JSON packed with gzip; {advice}") from None
+    if not isinstance(contents, dict) or contents.get("format") != FORMAT:
+        raise DataError(f"{path}: not in the form {FORMAT!r}; {advice} of this version")
+    return contents

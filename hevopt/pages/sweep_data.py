@@ -1,0 +1,252 @@
+"""What a sweep came to, design by design: taken from its cases in one pass, so that memory holds figures only."""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import fsum, nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.files import printable
+from hevopt.sweeps.export import export
+from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
+from hevopt.sweeps.prune import Pruned
+from hevopt.sweeps.reading import Reader, Record, open_to_read
+
+Array = NDArray[np.float64]
+Scalar = bool | int | float | str
+
+FAILURES_LISTED = 100
+# More cases than this are too many for a page to carry along.
+CASES_MAX = 30_000
+# Designs in the table that stands in for them.
+DESIGNS_MAX = 100_000
+# NOx of a smaller share in the objective tells too little of how it counts as fuel.
+_SHARE_MIN = 1e-3
+# A row's figures are rounded each on its own.
+_ROUNDING = 1e-9
+
+
+class Solved(NamedTuple):
+    """The best strategy's case of a design on a cycle."""
+
+    objective: float
+    strategy: str
+    fuel: float
+    nox: float
+    status: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Figures:
+    """Designs in the order of their numbers; arrays and lists are (design,), NaN where there is nothing.
+
+    objective, fuel, nox: means over the cycles of the best strategy's, fuel charge-corrected (l/100 km, mg/km)
+    bound: of the objective, mean over the cycles. Where the design was solved, for plans that leave at least the
+    charge that its cases left, charge-corrected as they are; else the certified dual for the asked charge
+    strategy, status: of the best cases, joined where cycles differ
+    fuel_per_nox: fuel (l/100 km) that 1 mg/km of NOx counts at weight 1, of the lightest fuel; None if never seen
+    """
+
+    number: NDArray[np.int64]
+    values: dict[str, list[Scalar]]
+    weight: Array
+    objective: Array
+    fuel: Array
+    nox: Array
+    bound: Array
+    strategy: list[str]
+    status: list[str]
+    fuel_per_nox: float | None
+
+    @property
+    def merit(self) -> Array:
+        """What designs are ranked by: the objective; the bound where the sweep asked for nothing else."""
+        return self.objective if np.isfinite(self.objective).any() else self.bound
+
+    @property
+    def gap_percent(self) -> Array:
+        """How far the objective lies above the design's own bound."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(
+                self.bound > 0, 100 * (self.objective - self.bound) / self.bound, np.nan
+            )
+
+
+@dataclass(slots=True)
+class Tally:
+    """How the cases ended.
+
+    counts: outcome -> cases; messages: (outcome, error) -> cases; failures: the first of those with an error
+    marks: a row's status other than ok -> cases; cycles, strategies: those planned
+    contradictions: cases whose objective is below their own bound
+    """
+
+    counts: Counter[str] = field(default_factory=Counter)
+    messages: Counter[tuple[str, str]] = field(default_factory=Counter)
+    failures: list[Record] = field(default_factory=list)
+    marks: Counter[str] = field(default_factory=Counter)
+    cycles: dict[str, None] = field(default_factory=dict)
+    strategies: dict[str, None] = field(default_factory=dict)
+    contradictions: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweep:
+    """A sweep as its store has it; meta: the store's; cases_csv: every case, or None where they are too many."""
+
+    name: str
+    meta: Mapping[str, str]
+    figures: Figures
+    tally: Tally
+    pruned: Sequence[Pruned]
+    cases_csv: bytes | None
+
+
+def load_sweep(path: Path) -> Sweep:
+    """The sweep of a store, which may be running; DataError where it cannot be read or has no designs."""
+    with open_to_read(path) as reader:
+        figures, tally = summary_of(reader.records())
+        if not len(figures.number):
+            raise DataError(f"{path}: the store has no study yet; run hevopt sweep on it first")
+        few = tally.counts.total() <= CASES_MAX
+        cases_csv = _csv(reader) if few else None
+        return Sweep(
+            printable(path.name), reader.meta(), figures, tally, reader.pruned(), cases_csv
+        )
+
+
+def _csv(reader: Reader) -> bytes:
+    """The table that `hevopt sweep --export` writes."""
+    with TemporaryDirectory(prefix="hevopt-") as folder:
+        path = Path(folder) / "cases.csv"
+        export(reader, path)
+        return path.read_bytes()
+
+
+def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
+    """The figures of all designs, and how the cases ended, of the cases of a sweep in any order."""
+    tally = Tally()
+    designs: dict[int, tuple[Mapping[str, Scalar], float]] = {}
+    best: dict[tuple[int, str], Solved] = {}
+    bounds: dict[tuple[int, str], float] = {}
+    duals: dict[tuple[int, str], float] = {}
+    worths: list[float] = []
+    for record in records:
+        _count(tally, record)
+        designs.setdefault(record.design, (record.parameters, record.nox_weight))
+        place, row = (record.design, record.cycle), record.row
+        if row is None:
+            continue
+        if record.strategy == BOUND:
+            duals[place] = row["bound_l_per_100km"]
+            continue
+        found = _solved(row)
+        best[place] = min(best.get(place, found), found)
+        own = _own_bound(row)
+        tally.contradictions += own > found.objective * (1 + _ROUNDING)
+        bounds[place] = min(bounds.get(place, found.objective), own)
+        nox_cost = found.objective - found.fuel
+        if nox_cost > _SHARE_MIN * found.objective:
+            worths.append(nox_cost / (record.nox_weight * found.nox))
+    numbers, cycles = sorted(designs), list(tally.cycles)
+    solved = [_mean_solved([best.get((n, cycle)) for cycle in cycles]) for n in numbers]
+    held = [[bounds.get((n, c), duals.get((n, c))) for c in cycles] for n in numbers]
+    figures = Figures(
+        number=np.array(numbers),
+        values={key: [designs[n][0][key] for n in numbers] for key in _keys(designs)},
+        weight=np.array([designs[n][1] for n in numbers]),
+        objective=np.array([s.objective for s in solved]),
+        fuel=np.array([s.fuel for s in solved]),
+        nox=np.array([s.nox for s in solved]),
+        bound=np.array([nan if None in of else fsum(of) / len(of) for of in held]),
+        strategy=[s.strategy for s in solved],
+        status=[s.status for s in solved],
+        fuel_per_nox=max(worths, default=None),
+    )
+    return figures, tally
+
+
+def _keys(designs: Mapping[int, tuple[Mapping[str, Scalar], float]]) -> list[str]:
+    return list(next(iter(designs.values()))[0]) if designs else []
+
+
+def _count(tally: Tally, record: Record) -> None:
+    tally.cycles[record.cycle] = None
+    if record.strategy != BOUND:
+        tally.strategies[record.strategy] = None
+    tally.counts[record.outcome] += 1
+    if record.error is not None:
+        tally.messages[record.outcome, record.error] += 1
+        if len(tally.failures) < FAILURES_LISTED:
+            tally.failures.append(record)
+    if record.row is not None and record.row["status"] != "ok":
+        tally.marks[record.row["status"]] += 1
+
+
+def _solved(row: Mapping[str, Any]) -> Solved:
+    return Solved(
+        row["objective_l_per_100km"],
+        row["strategy"],
+        row["fuel_corrected_l_per_100km"],
+        row["nox_mg_per_km"],
+        row["status"],
+    )
+
+
+def _own_bound(row: Mapping[str, Any]) -> float:
+    """The bound of a row's end charge, charge-corrected as the row's fuel is."""
+    return row["bound_l_per_100km"] - (row["fuel_l_per_100km"] - row["fuel_corrected_l_per_100km"])
+
+
+_NOTHING = Solved(nan, "", nan, nan, "")
+
+
+def _mean_solved(solved: Sequence[Solved | None]) -> Solved:
+    """A design's mean over the cycles; nothing where a cycle is not solved."""
+    if None in solved:
+        return _NOTHING
+    return Solved(
+        fsum(s.objective for s in solved) / len(solved),
+        ", ".join(dict.fromkeys(s.strategy for s in solved)),
+        fsum(s.fuel for s in solved) / len(solved),
+        fsum(s.nox for s in solved) / len(solved),
+        "; ".join(dict.fromkeys(s.status for s in solved if s.status != "ok")) or "ok",
+    )
+
+
+def designs_csv(figures: Figures) -> bytes:
+    """A line per design, only the best ones where there are more than DESIGNS_MAX."""
+    merit = figures.merit
+    order = np.arange(len(merit))
+    if len(merit) > DESIGNS_MAX:
+        order = np.sort(np.argsort(merit, kind="stable")[:DESIGNS_MAX])
+    columns: Mapping[str, Sequence[Any]] = {
+        "design": figures.number.tolist(),
+        **figures.values,
+        NOX_WEIGHT: figures.weight.tolist(),
+        "objective_l_per_100km": _ten_digits(figures.objective),
+        "fuel_corrected_l_per_100km": _ten_digits(figures.fuel),
+        "nox_mg_per_km": _ten_digits(figures.nox),
+        "bound_l_per_100km": _ten_digits(figures.bound),
+        "gap_percent": _ten_digits(figures.gap_percent),
+        "strategy": figures.strategy,
+        "status": figures.status,
+    }
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    lists = list(columns.values())
+    writer.writerows([of[n] for of in lists] for n in order.tolist())
+    return text.getvalue().encode()
+
+
+def _ten_digits(values: NDArray[np.float64]) -> list[float | None]:
+    return [None if np.isnan(value) else float(f"{value:.10g}") for value in values.tolist()]
