@@ -5,6 +5,8 @@ otherwise the engine runs and shifts its load point to keep the charge neutral; 
 threshold is calibrated: of the whole family, the member of least charge-corrected cost.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hevopt.problem import Plan, Problem
@@ -13,13 +15,18 @@ from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
 _THRESHOLDS = 24
 
 
-def solve(problem: Problem) -> Plan:
-    """The family's best member; notes["calibration"] holds the curve over the threshold."""
+def solve(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Plan:
+    """The family's best member; notes["calibration"] holds the curve over the threshold.
+
+    thresholds_w: members to choose from, by default evenly up to the highest power driven electrically
+    """
     rules = rules_of(problem)
-    electric = ~rules.standing & ~rules.braking & (rules.electric >= 0)
-    top_w = float(np.max(rules.power_w[electric], initial=0.0))
+    if thresholds_w is None:
+        electric = ~rules.standing & ~rules.braking & (rules.electric >= 0)
+        top_w = float(np.max(rules.power_w[electric], initial=0.0))
+        thresholds_w = np.linspace(0.0, top_w, _THRESHOLDS).tolist()
     members = [
         ({"threshold_w": threshold}, neutral_outcome(rules, threshold))
-        for threshold in np.linspace(0.0, top_w, _THRESHOLDS).tolist()
+        for threshold in thresholds_w
     ]
     return best_plan(rules, members, lambda member: member["corrected_kg"])

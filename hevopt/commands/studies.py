@@ -1,0 +1,247 @@
+"""`hevopt pareto`, `sensitivity` and `reproduction`: many problems solved for one answer."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hevopt.commands.options import (
+    ArchitectureArgument,
+    CycleOption,
+    JsonOption,
+    takes_settings,
+)
+from hevopt.commands.terminal import Progress, check_out, listed, show, write
+from hevopt.errors import DataError
+
+if TYPE_CHECKING:
+    from hevopt.architecture import Architecture
+    from hevopt.cycle import Cycle
+    from hevopt.pages.results import Results
+    from hevopt.sensitivity import Effect
+    from hevopt.study_file import Cars, Settings
+
+_OPTIONS = "the command line"
+
+
+@takes_settings
+def pareto(
+    given: dict[str, Any],
+    architecture: ArchitectureArgument,
+    cycle: CycleOption = "nedc",
+    weights: Annotated[
+        str | None,
+        typer.Option(
+            "--weights",
+            help="kg of fuel that a kg of NOx counts, separated by commas; else chosen.",
+        ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option("--points", help="Choose so many weights, or until nothing is left between."),
+    ] = None,
+    strategy: Annotated[
+        str, typer.Option("--strategy", help="Strategy whose plans are the points.")
+    ] = "dp",
+    json: JsonOption = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write points and outer front to this CSV file.")
+    ] = None,
+) -> None:
+    """Fuel against NOx: plans over the weight on NOx, and the certified front that none can cross."""
+    from hevopt.commands.studies_view import front_notes, front_table, write_front
+    from hevopt.cycle import load_cycle
+    from hevopt.study_file import cars_of, settings_of
+
+    if "nox_weight" in given:
+        raise DataError("--nox-weight: a front has many weights; give them as --weights 0,10,100")
+    if weights is not None and points is not None:
+        raise DataError("--weights and --points: choose one, the weights or how many to choose")
+    chosen = None if weights is None else _numbers("--weights", weights)
+    settings = settings_of(_OPTIONS, given)
+    cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
+    if out is not None:
+        _check_csv(out, str(cars.cars[0].source), str(trace.source))
+    with Progress() as progress:
+        figures, shortfall_steps = _front(
+            cars.cars[0],
+            trace,
+            settings,
+            progress,
+            strategy=strategy,
+            weights=chosen,
+            points=points,
+        )
+    if out is not None:
+        write_front(out, figures)
+    if json:
+        write(_json(figures | {"shortfall_steps": shortfall_steps} | _about(cars, trace)))
+        return
+    show(front_table(figures))
+    write(front_notes(figures, cars.cars[0], shortfall_steps))
+    if out is not None:
+        write(f"front written to {out}")
+
+
+@takes_settings
+def sensitivity(
+    given: dict[str, Any],
+    architecture: ArchitectureArgument,
+    cycle: CycleOption = "nedc",
+    strategies: Annotated[
+        str | None,
+        typer.Option("--strategies", help="Names, separated by commas (default: dp and the rule)."),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """How fuel and NOx move with mass, resistances, losses, auxiliaries, battery and NOx map."""
+    from hevopt.commands.studies_view import EFFECTS_NOTES, SHORTFALL_NOTE, effects_table
+    from hevopt.cycle import load_cycle
+    from hevopt.study_file import cars_of, settings_of
+
+    settings = settings_of(_OPTIONS, given)
+    cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
+    with Progress() as progress:
+        effects = _effects(cars.cars[0], cars, trace, settings, progress, listed(strategies))
+    if json:
+        found = {"cycle": trace.name, "sensitivity": [effect.as_dict() for effect in effects]}
+        write(_json(found | _about(cars, trace)))
+        return
+    for strategy in dict.fromkeys(effect.strategy for effect in effects):
+        show(effects_table([effect for effect in effects if effect.strategy == strategy], trace))
+    write(EFFECTS_NOTES)
+    if settings.get("allow_shortfall", False):
+        write(SHORTFALL_NOTE)
+
+
+def reproduction(
+    out: Annotated[Path, typer.Option("--out", help="The Markdown page to write.")],
+) -> None:
+    """The published study beside ours, with what each difference comes from."""
+    from hevopt.reproduction.cases import reproduce
+    from hevopt.reproduction.page import page
+    from hevopt.writing import check_writable, write_whole
+
+    check_writable(out)
+    with Progress() as progress:
+        found = reproduce(progress)
+    write_whole(out, page(found).encode())
+    write(f"written to {out}")
+
+
+def with_studies(
+    results: "Results",
+    cars: "Cars",
+    trace: "Cycle",
+    settings: "Settings",
+    *,
+    fronts: bool,
+    effects: bool,
+) -> "Results":
+    """The results of a comparison with the fronts and sensitivities of its cars, where asked for."""
+    from hevopt.pages.results import ParetoFront, Sensitivity
+
+    solved = [car for car in cars.cars if car.name in results.cars]
+    added: dict[str, Any] = {}
+    with Progress() as progress:
+        if fronts:
+            drawn = [_front(car, trace, settings, progress)[0] for car in solved]
+            added["pareto"] = [ParetoFront.model_validate(figures) for figures in drawn]
+        if effects:
+            found = [
+                effect
+                for car in solved
+                for effect in _effects(car, cars, trace, settings, progress)
+            ]
+            added["sensitivity"] = [Sensitivity.model_validate(e.as_dict()) for e in found]
+    return results.model_copy(update=added)
+
+
+def _front(
+    car: "Architecture",
+    trace: "Cycle",
+    settings: "Settings",
+    progress: Progress,
+    *,
+    strategy: str = "dp",
+    weights: Sequence[float] | None = None,
+    points: int | None = None,
+) -> tuple[dict[str, Any], int]:
+    """The figures of a car's front, and the number of steps driven with less than the cycle asks."""
+    from hevopt.pareto import GAP_ENOUGH, POINTS_MAX, figures_of, front
+    from hevopt.powertrain import build_problem
+    from hevopt.strategies import strategy_named
+
+    chosen = strategy_named(strategy)
+    if chosen.learns:
+        raise DataError(f"--strategy {strategy} learns from other cycles; choose another, as dp")
+    problem = build_problem(car, trace, allow_shortfall=settings.get("allow_shortfall", False))
+    found = front(
+        problem,
+        weights,
+        points_max=POINTS_MAX if points is None else points,
+        gap_enough=GAP_ENOUGH if points is None else 0.0,
+        solve=chosen.solve,
+        progress=lambda text, done, total: progress(f"{car.name}: {text}", done, total),
+    )
+    missing = problem.table.missing_torque_nm
+    short = 0 if missing is None else int((missing > 0).sum())
+    return figures_of(found, car, trace, strategy), short
+
+
+def _effects(
+    car: "Architecture",
+    cars: "Cars",
+    trace: "Cycle",
+    settings: "Settings",
+    progress: Progress,
+    strategies: Sequence[str] | None = None,
+) -> list["Effect"]:
+    from hevopt.sensitivity import sensitivities
+
+    free = {"gear": "free"} if car.gear == "free" else {}
+    return sensitivities(
+        car.source,
+        trace,
+        strategies,
+        nox_weight=settings.get("nox_weight", 0.0),
+        allow_shortfall=settings.get("allow_shortfall", False),
+        base={**cars.changes[car.name], **free},
+        progress=progress,
+    )
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    from hevopt.files import shown
+
+    try:
+        return [float(part) for part in text.split(",") if part.strip()]
+    except ValueError:
+        raise DataError(
+            f"{option} {shown(text)}; needed: numbers separated by commas, such as 0,10,100"
+        ) from None
+
+
+def _check_csv(out: Path, architecture: str, cycle: str) -> None:
+    from hevopt.files import printable
+
+    if out.suffix.lower() != ".csv":
+        raise DataError(f"--out {printable(str(out))}: choose a name that ends in .csv")
+    check_out(out, architecture, cycle)
+
+
+def _about(cars: "Cars", trace: "Cycle") -> dict[str, Any]:
+    from hevopt.provenance import files_digests, versions
+
+    return {
+        "inputs": dict(files_digests(cars.cars, [trace])),
+        "versions": versions(),
+        "changes": cars.changes,
+    }
+
+
+def _json(found: Mapping[str, Any]) -> str:
+    from json import dumps
+
+    return dumps(found, indent=1, allow_nan=False)

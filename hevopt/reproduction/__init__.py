@@ -1,0 +1,8 @@
+"""The published study done again, and what its differences from ours come from.
+
+variations.py   other assumptions, applied to cars, cycle or problem
+cases.py        the study as shipped and under each of them: figures
+verdicts.py     what reaches a published figure, and what is left
+sections.py     a table and a verdict for each difference
+page.py         the whole page, Markdown
+"""

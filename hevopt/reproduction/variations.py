@@ -1,0 +1,162 @@
+"""Other assumptions: a figure of the cars, the cycle's gears or what a rule may do changed, all else the same."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.architecture import Architecture, load_architecture
+from hevopt.cycle import Cycle
+from hevopt.powertrain import build_problem
+from hevopt.problem import Problem, Reject
+from hevopt.units import KMH_PER_MPS
+
+LOSS_FACTOR, RESISTANCE_FACTOR, HYBRID_MASS_FACTOR = 1.5, 2.0, 2.0
+DRIVELINE_LOSS_ADDED = 0.03
+AUXILIARIES_W = 400.0
+START_FUEL_G = 1.0
+RESISTANCE_SHARE = 0.1
+BRAKING_SHARES = (0.8, 0.6, 0.4)
+ELECTRIC_KMH = (20, 30, 40, 50)
+_LOSSES = ("loss_c0_w", "loss_c1_ws", "loss_c2_ws2", "loss_c3_wpnm2")
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """One other assumption, or several.
+
+    changes: a car as shipped -> key path and value of what is another in it
+    cycle, problem: what is another in the cycle, and in the problem of a car on it
+    """
+
+    name: str
+    changes: Callable[[Architecture], Mapping[str, Any]] = lambda car: {}
+    cycle: Callable[[Cycle], Cycle] = lambda cycle: cycle
+    problem: Callable[[Problem], Problem] = lambda problem: problem
+
+    def and_(self, other: "Variation", name: str) -> "Variation":
+        """Both at once; where they change the same key, the other's value."""
+        return Variation(
+            name,
+            lambda car: {**self.changes(car), **other.changes(car)},
+            lambda cycle: other.cycle(self.cycle(cycle)),
+            lambda problem: other.problem(self.problem(problem)),
+        )
+
+
+def varied(
+    architecture: str, cycle: Cycle, variation: Variation
+) -> tuple[Architecture, Cycle, Problem]:
+    """A shipped architecture, a cycle and their problem under a variation."""
+    car = load_architecture(architecture, dict(variation.changes(load_architecture(architecture))))
+    cycle = variation.cycle(cycle)
+    return car, cycle, variation.problem(build_problem(car, cycle))
+
+
+def neutral_at_standstill(cycle: Cycle) -> Cycle:
+    """The cycle with no gear engaged while the car stands: the engine may rest until it moves off."""
+    standing = np.append(cycle.speed_mps[1:] + cycle.speed_mps[:-1] == 0, False)
+    return replace(cycle, gear=np.where(standing, 0, cycle.gear))
+
+
+def electric_up_to(limit_kmh: float) -> Callable[[Problem], Problem]:
+    """Leaves no driving without fuel above a speed."""
+
+    def limited(problem: Problem) -> Problem:
+        signals = problem.table.signals
+        fast = (signals.speed_mps * KMH_PER_MPS > limit_kmh) & (signals.wheel_power_w > 0)
+        return without(problem, fast[:, None] & (problem.table.fuel_kg == 0))
+
+    return limited
+
+
+def braking_share(share: float) -> Callable[[Problem], Problem]:
+    """Leaves the machine no more than a share of the wheels' braking power; the brakes take the rest."""
+
+    def limited(problem: Problem) -> Problem:
+        flows, wheel_w = problem.table.flows, problem.table.signals.wheel_power_w[:, None]
+        taken_w = -flows["machine_torque_nm"] * flows["machine_speed_radps"]
+        return without(problem, (wheel_w < 0) & (taken_w > np.maximum(-share * wheel_w, 0)))
+
+    return limited
+
+
+def without(problem: Problem, unwanted: NDArray[np.bool_]) -> Problem:
+    """The problem with (time, control) controls taken away, but at steps where none would be left."""
+    table = problem.table
+    left = (table.feasible & ~unwanted).any(axis=1)
+    bits = np.where(unwanted & left[:, None], np.uint16(Reject.FUNCTION), np.uint16(0))
+    return replace(problem, table=replace(table, reject=table.reject | bits))
+
+
+def _is_hybrid(car: Architecture) -> bool:
+    return "power_management" in car.functions
+
+
+def _times(car: Architecture, component: str, keys: tuple[str, ...], factor: float) -> dict:
+    table = car.contents[component]
+    return {f"{component}.{key}": factor * table[key] for key in keys if key in table}
+
+
+def _driveline(car: Architecture) -> dict[str, float]:
+    changes = {"gearbox.efficiency": car.contents["gearbox"]["efficiency"] - DRIVELINE_LOSS_ADDED}
+    own = car.contents["coupling"].get("machine_efficiency")
+    if own is not None:
+        changes["coupling.machine_efficiency"] = own - DRIVELINE_LOSS_ADDED
+    return changes
+
+
+def _alternator_as_belt(car: Architecture) -> dict[str, float]:
+    if car.coupling.kind != "none":
+        return {}
+    return {"machine.efficiency": load_architecture("B").machine.efficiency}
+
+
+def _road(car: Architecture) -> dict[str, float]:
+    load, factor = car.contents["car"]["road_load"], 1 + RESISTANCE_SHARE
+    keys = ("rolling_c0", "rolling_c1_spm", "drag_area_m2")
+    return {f"car.road_load.{key}": factor * load[key] for key in keys}
+
+
+def _no_recovery(car: Architecture) -> dict[str, list[str]]:
+    return {"functions": sorted(car.functions - {"regenerative_braking"})}
+
+
+AS_SHIPPED = Variation("as shipped")
+K_PHASES = Variation("engine rests in the K phases", cycle=neutral_at_standstill)
+FREE_STARTS = Variation("a start costs no fuel", lambda car: {"engine.start_fuel_g": 0.0})
+DEAR_STARTS = Variation(
+    f"a start costs {START_FUEL_G:g} g", lambda car: {"engine.start_fuel_g": START_FUEL_G}
+)
+NO_INERTIA = Variation("no engine inertia", lambda car: {"engine.inertia_kgm2": 0.0})
+DRIVELINE = Variation(f"driveline efficiency less {DRIVELINE_LOSS_ADDED:g}", _driveline)
+MACHINE_LOSS = Variation(
+    f"machine loss x {LOSS_FACTOR:g}", lambda car: _times(car, "machine", _LOSSES, LOSS_FACTOR)
+)
+RESISTANCE = Variation(
+    f"battery resistance x {RESISTANCE_FACTOR:g}",
+    lambda car: _times(car, "battery", ("resistance_ohm",), RESISTANCE_FACTOR),
+)
+HYBRID_MASS = Variation(
+    f"hybrid parts weigh {HYBRID_MASS_FACTOR:g} times as much",
+    lambda car: {"hybrid_mass_kg": HYBRID_MASS_FACTOR * car.contents["hybrid_mass_kg"]},
+)
+AUXILIARIES = Variation(
+    f"auxiliaries {AUXILIARIES_W:g} W", lambda car: {"car.auxiliary_power_w": AUXILIARIES_W}
+)
+ALTERNATOR = Variation("A's alternator as efficient as B's machine", _alternator_as_belt)
+ROAD = Variation(f"rolling and air resistance +{100 * RESISTANCE_SHARE:g} %", _road)
+STEEP_NOX = Variation("steep NOx map", lambda car: {"engine": "engine_diesel_1600_steep_nox"})
+NO_RECOVERY = Variation("no regenerative braking", _no_recovery)
+BRAKING = tuple(
+    Variation(
+        f"machine takes at most {100 * share:g} % of the braking", problem=braking_share(share)
+    )
+    for share in BRAKING_SHARES
+)
+ELECTRIC = tuple(
+    Variation(f"electric driving up to {kmh} km/h only", problem=electric_up_to(kmh))
+    for kmh in ELECTRIC_KMH
+)

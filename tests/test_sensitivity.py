@@ -1,0 +1,104 @@
+"""Sensitivities: each value is the car solved afresh, and the effects are what physics and arithmetic say."""
+
+import json
+from functools import cache
+from math import log
+
+import pytest
+from test_cli import call
+
+from hevopt import InfeasibleError, load_architecture, load_cycle
+from hevopt.pages.results import load_results
+from hevopt.sensitivity import sensitivities
+from hevopt.study import prepare, run_case
+
+
+@cache
+def of_b():
+    return {(e.strategy, e.parameter): e for e in sensitivities("B", "nedc")}
+
+
+def test_a_value_is_the_changed_car_solved_afresh():
+    effect = of_b()["dp", "vehicle mass"]
+    assert effect.values == pytest.approx([1170, 1300, 1430])
+    car = load_architecture("B", {"car.mass_kg": effect.values[2]})
+    row, _, _ = run_case(prepare(car, load_cycle("nedc")), "dp")
+    assert effect.fuel_l_per_100km[2] == row.fuel_corrected_l_per_100km
+    assert effect.nox_mg_per_km[2] == row.nox_mg_per_km
+
+
+def test_dearer_starts_add_their_fuel_and_nothing_else():
+    effect = of_b()["start_stop", "fuel of a start"]
+    row, _, _ = run_case(prepare(load_architecture("B"), load_cycle("nedc")), "start_stop")
+    added_l = row.engine_starts * 0.02e-3 / 0.835 / load_cycle("nedc").distance_m * 1e5
+    assert effect.fuel_l_per_100km[2] - effect.fuel_l_per_100km[1] == pytest.approx(added_l)
+    fuel_l = effect.fuel_l_per_100km[1]
+    expected = log((fuel_l + added_l) / (fuel_l - added_l)) / log(0.22 / 0.18)
+    assert effect.elasticity == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("strategy", ["dp", "start_stop"])
+def test_more_to_move_and_more_to_lose_burns_more(strategy):
+    more = ("vehicle mass", "rolling resistance", "drag area", "auxiliaries", "engine inertia")
+    for parameter in more:
+        effect = of_b()[strategy, parameter]
+        assert effect.delta_percent[0] < 0 == effect.delta_percent[1] < effect.delta_percent[2]
+        assert 0 < effect.elasticity < 1
+    for parameter in ("driveline efficiency", "machine efficiency", "coulombic efficiency"):
+        effect = of_b()[strategy, parameter]
+        assert effect.delta_percent[0] > 0 > effect.delta_percent[2] and effect.elasticity < 0
+
+
+def test_the_nox_map_moves_nox_alone():
+    effect = of_b()["dp", "NOx map, high over low load"]
+    assert effect.delta_percent == [0, 0] and effect.delta_nox_percent[1] < -5
+    assert effect.values == pytest.approx([3.938 / 1.216, 8.0])
+
+
+def test_a_car_has_the_parameters_of_its_own_files():
+    """B has one battery cell and no machine loss coefficients; its battery's resistance is 0."""
+    names = {parameter for _, parameter in of_b()}
+    assert "machine efficiency" in names
+    assert not names & {"machine loss", "battery cells in series", "battery resistance"}
+
+
+def test_what_is_changed_from_the_start_is_the_car_that_is_compared_with():
+    base = {"car.mass_kg": 1500, "engine": "engine_diesel_1600_steep_nox"}
+    effects = {e.parameter: e for e in sensitivities("A", "nedc", base=base)}
+    assert effects["vehicle mass"].values == pytest.approx([1350, 1500, 1650])
+    assert "NOx map, high over low load" not in effects  # it has the other one already
+
+
+def test_a_value_that_cannot_be_driven_is_named():
+    with pytest.raises(InfeasibleError, match=r"^A, vehicle mass 3740: "):
+        sensitivities("A", "nedc", base={"car.mass_kg": 3400})
+
+
+def test_the_command_shows_what_the_json_holds(monkeypatch, capsys):
+    status, out, _ = call(monkeypatch, capsys, "sensitivity", "A", "--json")
+    assert status == 0
+    found = json.loads(out)["sensitivity"]
+    assert {e["strategy"] for e in found} == {"baseline"}
+    status, out, _ = call(monkeypatch, capsys, "sensitivity", "A")
+    assert status == 0
+    for effect in found:
+        line = next(line for line in out.splitlines() if effect["parameter"] in line)
+        assert f"{effect['values'][-1]:.4g}" in line
+        if effect["elasticity"]:
+            assert f"{effect['delta_percent'][0]:+.2f}" in line
+            assert f"{effect['elasticity']:+.3f}" in line
+
+
+def test_a_saved_comparison_holds_fronts_and_sensitivities_where_asked(
+    monkeypatch, capsys, tmp_path
+):
+    path = tmp_path / "results.gz"
+    words = ("compare", "--architectures", "A", "--save", str(path), "--fronts", "--sensitivity")
+    status, _, err = call(monkeypatch, capsys, *words)
+    assert status == 0, err
+    results = load_results(path)
+    assert [front.architecture for front in results.pareto] == ["A"]
+    own = {effect.parameter: effect.as_dict() for effect in sensitivities("A", "nedc")}
+    assert {effect.parameter: effect.model_dump() for effect in results.sensitivity} == own
+    status, _, err = call(monkeypatch, capsys, "compare", "--architectures", "A", "--fronts")
+    assert status == 2 and "--report or --save" in err
