@@ -9,7 +9,16 @@ from typing import Annotated
 import typer
 
 from hevopt import __version__
-from hevopt.commands import listing, solving
+from hevopt.commands import (
+    architectures,
+    importing,
+    listing,
+    mapping,
+    reporting,
+    solving,
+    studies,
+    sweep,
+)
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError, HevoptError, SolverError
 
@@ -36,10 +45,24 @@ def _root(
         raise typer.Exit
 
 
-for command in (solving.compare, solving.run, solving.table, listing.strategies):
+for command in (
+    solving.compare,
+    solving.run,
+    solving.table,
+    listing.strategies,
+    reporting.report,
+    architectures.validate,
+    mapping.coastdown,
+    sweep.sweep,
+    studies.pareto,
+    studies.sensitivity,
+    studies.reproduction,
+):
     app.command()(command)
 app.add_typer(listing.architectures_app, name="architectures")
+listing.cycles_app.command("import")(importing.import_cycle)
 app.add_typer(listing.cycles_app, name="cycles")
+app.add_typer(mapping.maps_app, name="maps")
 
 
 def main() -> None:

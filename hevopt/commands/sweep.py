@@ -1,0 +1,285 @@
+"""`hevopt sweep`: run a study into a store, see how far one is, export it."""
+
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hevopt.commands.reporting import command_line
+from hevopt.commands.sweep_view import (
+    SweepProgress,
+    best_table,
+    counted,
+    duration,
+    failures,
+)
+from hevopt.commands.terminal import show, write
+from hevopt.errors import DataError, InfeasibleError
+from hevopt.files import printable
+
+if TYPE_CHECKING:
+    from hevopt.sweeps.reading import Reader
+    from hevopt.sweeps.run import Execution, Plan, Progress
+    from hevopt.sweeps.signals import Wish
+
+_PARTLY = 4
+_FIRST_CASES = 5
+
+
+def sweep(
+    study: Annotated[
+        Path | None, typer.Argument(help="TOML file of the study.", show_default=False)
+    ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option("--store", help="File of the results (default: beside the study, .sqlite)."),
+    ] = None,
+    backend: Annotated[
+        str, typer.Option("--backend", help="What runs the workers: loky, dask or ray.")
+    ] = "loky",
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, help="Number of workers (default: all cores).")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", help="Address of a running Dask or Ray cluster."),
+    ] = None,
+    timeout: Annotated[
+        float | None,
+        typer.Option("--timeout", min=0.001, help="Seconds after which a case is a failed one."),
+    ] = None,
+    memory_mb: Annotated[
+        float | None,
+        typer.Option("--memory-mb", min=1, help="Address space of a worker's process, MB."),
+    ] = None,
+    prune: Annotated[
+        bool,
+        typer.Option("--prune", help="Solve no design whose certified bound proves it worse."),
+    ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume/--no-resume",
+            help="Run what the store lacks; or refuse a store that exists.",
+        ),
+    ] = True,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Run failed cases of the store once more.")
+    ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="Say what would run and how long; run only a sample."),
+    ] = False,
+    status: Annotated[
+        Path | None,
+        typer.Option("--status", help="Say how far the sweep of this store is, and nothing else."),
+    ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option("--export", help="Write the cases to this .csv or .parquet file."),
+    ] = None,
+) -> None:
+    """Solve every design of a study on all cores or a cluster; stopped at any time, it goes on where it was."""
+    if status is not None:
+        if study is not None or export is not None:
+            raise DataError("--status FILE stands alone; leave out the study and --export")
+        _show_status(status)
+        return
+    if study is None:
+        if store is None or export is None:
+            raise DataError(
+                "name a study, as in `hevopt sweep study.toml`; or `--status FILE`; or `--store FILE "
+                "--export TABLE.csv`"
+            )
+        _export(store, export)
+        return
+    from hevopt.sweeps.run import Execution
+    from hevopt.sweeps.signals import wish_to_end
+
+    execution = Execution(backend, jobs, scheduler, timeout, memory_mb)
+    store = study.with_suffix(".sqlite") if store is None else store
+    _check(execution, study, store, export, resume)
+    with SweepProgress() as progress, wish_to_end() as wish:
+        try:
+            if dry_run:
+                _rehearse(study, store, execution, prune, progress, wish)
+                return
+            done = _run(study, store, execution, prune, retry_failed, progress, wish)
+        except KeyboardInterrupt:
+            done = None
+        progress.finish()
+        _end(store, done, export)
+
+
+def _check(
+    execution: "Execution", study: Path, store: Path, export: Path | None, resume: bool
+) -> None:
+    """DataError, before anything is planned, where something could not be had at the end."""
+    from hevopt.sweeps.export import check_export
+    from hevopt.sweeps.pools import check_backend
+    from hevopt.writing import check_writable
+
+    check_backend(execution.backend, execution.scheduler)
+    check_writable(store)
+    paths = {"the study": study, "--store": store, "--export": export}
+    named = {what: path.resolve() for what, path in paths.items() if path is not None}
+    if len(set(named.values())) < len(named):
+        raise DataError(f"{', '.join(named)} name one file; choose different ones")
+    if export is not None:
+        check_export(export)
+    if store.exists() and store.stat().st_size and not resume:
+        raise DataError(
+            f"{store} exists, and --no-resume asks for a new store; remove it yourself, or name another "
+            "with --store"
+        )
+
+
+def _run(
+    study: Path,
+    store: Path,
+    execution: "Execution",
+    prune: bool,
+    retry_failed: bool,
+    progress: SweepProgress,
+    wish: "Wish",
+) -> "Progress | None":
+    """How it went; None where it was stopped."""
+    from hevopt.sweeps.lock import locked
+    from hevopt.sweeps.reading import open_to_read
+    from hevopt.sweeps.run import Stopped, Watch, begin, plan_of, run_sweep
+    from hevopt.sweeps.store import open_store
+    from hevopt.sweeps.study_file import read_study
+
+    contents = read_study(study)
+    with locked(store):
+        if store.exists() and store.stat().st_size:
+            with open_to_read(store):
+                pass  # one message at once, not after minutes of planning, where it is no store
+        plan = plan_of(contents, prune=prune)
+        with open_store(store) as opened:
+            begin(plan, opened, command_line())
+            others = opened.others()
+            if others and not opened.statuses():
+                progress.say(
+                    f"{store} holds {others} results, none of this study as it is now (inputs, hevopt or "
+                    "a library changed): they stay, and everything is run"
+                )
+            try:
+                with wish.held():
+                    return run_sweep(
+                        plan, opened, execution, prune=prune, retry_failed=retry_failed,
+                        watch=Watch(progress, progress.say, wish),
+                    )  # fmt: skip
+            except Stopped:
+                return None
+
+
+def _rehearse(
+    study: Path,
+    store: Path,
+    execution: "Execution",
+    prune: bool,
+    progress: SweepProgress,
+    wish: "Wish",
+) -> None:
+    from hevopt.sweeps.pools import cores
+    from hevopt.sweeps.reading import open_to_read
+    from hevopt.sweeps.run import Watch, plan_of, timed_sample
+    from hevopt.sweeps.study_file import read_study
+
+    plan = plan_of(read_study(study), prune=prune)
+    keys = {case.key for case in plan.planned}
+    done: set[str] = set()
+    if store.exists() and store.stat().st_size:
+        with open_to_read(store) as reader:
+            done = keys & reader.keys()
+    _say_plan(plan, len(keys), len(done))
+    with wish.held():
+        sample = timed_sample(plan, keys - done, execution, Watch(notice=progress.say, stop=wish))
+    if sample is None:
+        write("nothing is left to run")
+        return
+    workers = execution.workers or cores()
+    write(
+        f"timed sample: {sample.cases} cases, one after the other, took {duration(sample.seconds)}; estimate: "
+        f"{duration(sample.total_s)} on one worker, {duration(sample.total_s / workers)} on {workers}"
+        + (", less what is pruned" if prune else "")
+    )
+
+
+def _say_plan(plan: "Plan", cases: int, done: int) -> None:
+    designs = plan.designs
+    dropped = f", {designs.excluded} more excluded by constraints" if designs.excluded else ""
+    twice = f", {designs.duplicates} more sampled twice" if designs.duplicates else ""
+    write(
+        f"{len(designs)} designs{dropped}{twice}; {cases} cases, {done} of them in the store already"
+    )
+    write("first cases:")
+    for case in plan.planned[:_FIRST_CASES]:
+        values = ", ".join(f"{k} = {v}" for k, v in designs[case.design].values.items())
+        write(f"  design {case.design} ({values}), {case.cycle}, {case.strategy}")
+
+
+def _end(store: Path, done: "Progress | None", export: Path | None) -> None:
+    """Say what came of it; the exit status says it too."""
+    from hevopt.sweeps.export import export as write_export
+    from hevopt.sweeps.reading import open_to_read
+
+    if done is None and not store.exists():
+        write("stopped before anything was run; the same command starts it")
+        raise typer.Exit(_PARTLY)
+    with open_to_read(store) as reader:
+        counts = reader.counts()
+        if done is not None:
+            _say_results(reader, done)
+        write(counted(counts))
+        if export is not None and done is not None:
+            write(f"{write_export(reader, export)} cases written to {export}")
+    if done is None:
+        write(f"stopped; all results there are lie in {store}; the same command goes on from there")
+        raise typer.Exit(_PARTLY)
+    write(
+        f"results in {store}; tables: hevopt sweep --store {store} --export FILE.csv; page: hevopt report {store}"
+    )
+    if counts["failed"]:
+        write("--retry-failed runs failed cases once more")
+        raise typer.Exit(
+            _PARTLY if counts["ok"] + counts["infeasible"] else InfeasibleError.exit_status
+        )
+
+
+def _say_results(reader: "Reader", done: "Progress") -> None:
+    took_s = monotonic() - done.began_s
+    pace = f", {done.done / took_s:.3g}/s" if done.done else ""
+    write(f"{done.done} cases run in {duration(took_s)}{pace}; {done.failed} of them failed")
+    for line in failures(reader):
+        write(line)
+    table = best_table(reader)
+    if table is not None:
+        show(table)
+
+
+def _show_status(path: Path) -> None:
+    from hevopt.sweeps.reading import open_to_read
+
+    with open_to_read(path) as reader:
+        meta, counts = reader.meta(), reader.counts()
+        write(f"study {printable(meta.get('study_file', 'unknown'))}, begun {meta.get('begun')}")
+        write(counted(counts))
+        for line in failures(reader):
+            write(line)
+        table = best_table(reader)
+        if table is not None:
+            show(table)
+
+
+def _export(store: Path, out: Path) -> None:
+    from hevopt.sweeps.export import check_export, export
+    from hevopt.sweeps.reading import open_to_read
+
+    check_export(out)
+    if out.resolve() == store.resolve():
+        raise DataError(f"--store and --export name one file, {out}; choose two")
+    with open_to_read(store) as reader:
+        write(f"{export(reader, out)} cases written to {out}")

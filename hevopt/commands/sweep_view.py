@@ -1,0 +1,158 @@
+"""What a sweep shows while it runs and when it ends."""
+
+import sys
+from collections import Counter
+from math import isfinite
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from hevopt.files import printable, shown
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from hevopt.sweeps.ranking import Ranked
+    from hevopt.sweeps.reading import Reader
+    from hevopt.sweeps.run import Progress
+
+_LINE_EVERY_S = 10.0
+_BEST = 5
+_ERRORS_LISTED = 3
+_ERROR_CHARACTERS = 200
+
+
+class SweepProgress:
+    """A bar on a terminal, or else a line on stderr every ten seconds: how far, how fast, how long, what failed."""
+
+    def __enter__(self) -> "SweepProgress":
+        from rich.console import Console
+
+        self._console = Console(stderr=True)
+        self._bar, self._task = None, None
+        self._said_s = monotonic()
+        return self
+
+    def __call__(self, progress: "Progress") -> None:
+        if self._console.is_terminal:
+            self._draw(progress)
+        elif monotonic() - self._said_s >= _LINE_EVERY_S:
+            self._said_s = monotonic()
+            self.say(f"{progress.done} of {progress.total} cases, {_pace(progress)}")
+
+    def say(self, text: str) -> None:
+        """A line on stderr, above the bar where there is one."""
+        if self._bar is None:
+            print(f"hevopt: {text}", file=sys.stderr, flush=True)
+        else:
+            self._console.print(f"hevopt: {text}", markup=False, highlight=False)
+
+    def _draw(self, progress: "Progress") -> None:
+        from rich import progress as parts
+
+        if self._bar is None:
+            self._bar = parts.Progress(
+                parts.BarColumn(), parts.MofNCompleteColumn(), parts.TextColumn("{task.fields[pace]}"),
+                console=self._console, refresh_per_second=4,
+            )  # fmt: skip
+            self._task = self._bar.add_task("", total=progress.total, pace="")
+            self._bar.start()
+        self._bar.update(
+            self._task, completed=progress.done, total=progress.total, pace=_pace(progress)
+        )
+
+    def finish(self) -> None:
+        """Leave the bar as it is."""
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __exit__(self, *_: object) -> None:
+        self.finish()
+
+
+def _pace(progress: "Progress") -> str:
+    rate = progress.done / max(monotonic() - progress.began_s, 1e-9)
+    left = duration((progress.total - progress.done) / rate) if rate else "time unknown"
+    pruned = f", {progress.pruned} pruned" if progress.pruned else ""
+    return f"{rate:.3g}/s, {left} left, {progress.failed} failed{pruned}"
+
+
+def duration(seconds: float) -> str:
+    """A time as one reads it: 42 s, 3 min 20 s, 5 h 2 min, 3 d 4 h."""
+    if not isfinite(seconds) or seconds < 59.5:
+        return f"{seconds:.2g} s" if seconds < 9.5 else f"{seconds:.0f} s"
+    parts, rest = [], round(seconds)
+    for unit, size in (("d", 86400), ("h", 3600), ("min", 60), ("s", 1)):
+        count, rest = divmod(rest, size)
+        parts += [f"{count} {unit}"] if count or parts else []
+    return " ".join(parts[:2])
+
+
+def counted(counts: dict[str, int]) -> str:
+    """The cases of a plan by outcome, in one line."""
+    named = ("ok", "infeasible", "failed", "pruned", "missing")
+    listed = ", ".join(f"{counts[name]} {name}" for name in named if counts[name])
+    total = sum(counts[name] for name in named)
+    other = (
+        f"; {counts['other']} results of other inputs or code are kept" if counts["other"] else ""
+    )
+    return f"{total} cases of {counts['designs']} designs: {listed or 'none'}{other}"
+
+
+def failures(reader: "Reader") -> list[str]:
+    """The most frequent errors of failed cases, each with its number and the first design it befell."""
+    found: Counter[str] = Counter()
+    first: dict[str, int] = {}
+    for record in reader.records():
+        if record.outcome == "failed":
+            error = printable(
+                str(record.error).splitlines()[0] if record.error else "no reason given"
+            )
+            found[error] += 1
+            first.setdefault(error, record.design)
+    lines = []
+    for error, count in found.most_common(_ERRORS_LISTED):
+        text = error if len(error) <= _ERROR_CHARACTERS else error[: _ERROR_CHARACTERS - 3] + "..."
+        lines.append(f"failed {count} times, first in design {first[error]}: {text}")
+    more = len(found) - _ERRORS_LISTED
+    return [*lines, f"and {more} more kinds of failure; --export lists them"] if more > 0 else lines
+
+
+def best_table(reader: "Reader") -> "Table | None":
+    """The best designs with their objective and bound; None where nothing is solved."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from hevopt.sweeps.ranking import best_designs
+
+    best = best_designs(reader, _BEST)
+    each = max(1, _BEST // max(1, len(best)))
+    ranked = [design for designs in best.values() for design in designs[:each]]
+    if not ranked:
+        return None
+    table = Table(
+        box=box.SIMPLE_HEAD, title=Text("best designs" if len(best) < 2 else "best designs of each NOx weight"),
+        title_justify="left", collapse_padding=True, pad_edge=False,
+    )  # fmt: skip
+    table.add_column("design", justify="right")
+    for name in ranked[0].parameters:
+        table.add_column(Text(printable(name)), justify="right")
+    for head in ("objective\nl/100km", "bound\nl/100km", "gap\n%"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for design in ranked:
+        table.add_row(*map(Text, _cells(design)))
+    return table
+
+
+def _cells(ranked: "Ranked") -> list[str]:
+    figures = [f"{v:.4f}" if v is not None else "-" for v in (ranked.objective, ranked.bound)]
+    gap = "-"
+    if ranked.objective is not None and ranked.bound:
+        gap = f"{100 * (ranked.objective / ranked.bound - 1):.3f}"
+    return [str(ranked.design), *map(_value, ranked.parameters.values()), *figures, gap]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return printable(value) if isinstance(value, str) else shown(value)

@@ -1,0 +1,106 @@
+"""The cases of a store as a table in a file: CSV, or Parquet where pyarrow is installed."""
+
+import csv
+import io
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from hevopt.errors import DataError
+from hevopt.files import printable
+from hevopt.sweeps.jobs import NOX_WEIGHT
+from hevopt.sweeps.reading import OUTCOMES, Reader
+from hevopt.writing import check_writable, write_whole
+
+_LEADING = ("design", "cycle", "strategy", "outcome")
+_LAST = ("error", "solve_s")
+# Lines that a part of a Parquet file has, so that memory holds few of them.
+_GROUP = 10_000
+
+
+def check_export(path: Path) -> None:
+    """DataError, before anything runs, where a table could not be written to this file."""
+    if path.suffix not in (".csv", ".parquet"):
+        raise DataError(f"--export {path}: a file ending in .csv or .parquet is needed")
+    check_writable(path)
+    if path.suffix == ".parquet":
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError:
+            raise DataError(
+                '--export to Parquet needs pyarrow; run: pip install "hevopt[parquet]", or export to a '
+                ".csv file"
+            ) from None
+
+
+def export(reader: Reader, path: Path) -> int:
+    """Write a line per case, by design, cycle and strategy, parameters and figures as columns; how many lines.
+
+    The text is the same whatever ran the sweep, apart from the column solve_s.
+    """
+    check_export(path)
+    write_whole(path, csv_of(reader) if path.suffix == ".csv" else _parquet_of(reader))
+    counts = reader.counts()
+    return sum(counts[outcome] for outcome in OUTCOMES)
+
+
+def csv_of(reader: Reader) -> bytes:
+    """The table that `export` writes to a .csv file."""
+    out = io.BytesIO()
+    text = io.TextIOWrapper(out, encoding="utf-8", newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    names = list(_kinds(reader))
+    writer.writerow(map(printable, names))
+    for line in _lines(reader):
+        values = [line.get(name) for name in names]
+        writer.writerow([repr(v) if isinstance(v, float) else v for v in values])
+    text.flush()
+    return out.getvalue()
+
+
+def _parquet_of(reader: Reader) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    types = {int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+    kinds = _kinds(reader)
+    schema = pa.schema([(name, types.get(kind, pa.string())) for name, kind in kinds.items()])
+    out = io.BytesIO()
+    lines = _lines(reader)
+    with pq.ParquetWriter(out, schema) as writer:
+        while group := list(islice(lines, _GROUP)):
+            columns = {
+                name: [None if line.get(name) is None else kind(line[name]) for line in group]
+                for name, kind in kinds.items()
+            }
+            writer.write_table(pa.table(columns, schema))
+    return out.getvalue()
+
+
+def _kinds(reader: Reader) -> dict[str, type]:
+    """Column name -> what its values are: floats where whole numbers stand among others, text beside any text.
+
+    A parameter keeps its key path as name; NOx weight stands among the parameters.
+    """
+    found: dict[str, set[type]] = {name: set() for name in _LEADING}
+    for line in _lines(reader):
+        for name, value in line.items():
+            found.setdefault(name, set()).add(type(value))
+    ordered = [name for name in found if name not in _LAST] + list(_LAST)
+    return {name: _kind_of(found.get(name, set()) - {type(None)}) for name in ordered}
+
+
+def _kind_of(kinds: set[type]) -> type:
+    if kinds == {int, float}:
+        return float
+    return kinds.pop() if len(kinds) == 1 else str
+
+
+def _lines(reader: Reader) -> Iterator[dict[str, Any]]:
+    for record in reader.records():
+        line = {name: getattr(record, name) for name in _LEADING}
+        line |= record.parameters
+        line[NOX_WEIGHT] = record.nox_weight
+        line |= {k: v for k, v in (record.row or {}).items() if k != "strategy"}
+        yield line | {"error": record.error, "solve_s": record.seconds}

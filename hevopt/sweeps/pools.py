@@ -1,0 +1,159 @@
+"""Where tasks go: processes of this machine (loky), a Dask or a Ray cluster, of its own or one that runs already.
+
+A pool takes a function of no arguments and gives a future. Dask and Ray are imported where they are asked for.
+"""
+
+import logging
+import os
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from hevopt.errors import DataError
+from hevopt.files import shown
+from hevopt.sweeps.supervisor import ONE_THREAD
+
+BACKENDS = ("loky", "dask", "ray")
+_CONNECT_S = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pool:
+    """send: puts a call on its way; workers: how many run at a time; window: how many to have on their way."""
+
+    send: Callable[[Callable[[], Any]], Future]
+    workers: int
+    window: int
+    close: Callable[[], None]
+
+
+def open_pool(backend: str, workers: int | None, scheduler: str | None) -> Pool:
+    """A pool of some workers: by default as many as this process may use cores, or all of the scheduler's.
+
+    Raises DataError where the backend is not installed, or nothing answers at the scheduler's address.
+    """
+    opened = {"loky": _loky, "dask": _dask, "ray": _ray}[backend]
+    return opened(workers, scheduler)
+
+
+def check_backend(backend: str, scheduler: str | None) -> None:
+    """DataError, before anything is planned, where a backend is unknown or not installed."""
+    if backend not in BACKENDS:
+        raise DataError(f"backend {shown(backend)}; allowed: {', '.join(BACKENDS)}")
+    if backend == "loky" and scheduler is not None:
+        raise DataError(
+            "--scheduler: loky runs on this machine alone; choose --backend dask or ray"
+        )
+    try:
+        if backend == "dask":
+            import distributed  # noqa: F401
+        elif backend == "ray":
+            import ray  # noqa: F401
+    except ImportError:
+        raise DataError(
+            f'backend {backend} is not installed; run: pip install "hevopt[{backend}]"'
+        ) from None
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    from joblib import cpu_count
+
+    return cpu_count()
+
+
+def _loky(workers: int | None, _: str | None) -> Pool:
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    count = workers or cores()
+    executor = ProcessPoolExecutor(count, env=ONE_THREAD)
+    # Workers hold nothing but a process that solves; ended at once, they take it along.
+    return Pool(executor.submit, count, 2 * count, lambda: executor.shutdown(kill_workers=True))
+
+
+def _dask(workers: int | None, scheduler: str | None) -> Pool:
+    from distributed import Client, LocalCluster
+
+    cluster = client = None
+    try:
+        if scheduler is None:
+            cluster = LocalCluster(
+                n_workers=workers or cores(), threads_per_worker=1, processes=True, memory_limit=0,
+                dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
+            )  # fmt: skip
+        client = Client(cluster or scheduler, timeout=_CONNECT_S, set_as_default=False)
+        client.wait_for_workers(1, timeout=_CONNECT_S)
+    except Exception as error:
+        for opened in filter(None, (client, cluster)):
+            opened.close()
+        raise _no_answer("Dask", scheduler, error) from None
+
+    count = sum(client.nthreads().values())
+    limited = min(workers or count, count)
+    kept: dict[Future, Any] = {}
+
+    def send(call: Callable[[], Any]) -> Future:
+        done: Future = Future()
+        # Its arguments travel with the task, so that no worker's end loses them. A future let go is cancelled.
+        kept[done] = future = client.submit(call, pure=False)
+        future.add_done_callback(lambda found: settle(done, found))
+        return done
+
+    def settle(done: Future, found: Any) -> None:
+        try:
+            done.set_result(found.result())
+        except BaseException as error:
+            done.set_exception(error)
+        kept.pop(done, None)
+
+    def close() -> None:
+        with suppress(Exception):
+            client.cancel(list(kept.values()), force=True)
+        kept.clear()
+        client.close()
+        if cluster is not None:
+            cluster.close()
+
+    return Pool(send, limited, limited if workers and scheduler else 2 * limited, close)
+
+
+def _ray(workers: int | None, scheduler: str | None) -> Pool:
+    import ray
+
+    where: dict[str, Any] = {}
+    if scheduler is None:
+        where = {"num_cpus": workers or cores(), "include_dashboard": False}
+        # Where memory runs out, the system ends the process of a case; Ray would end its worker, time after time.
+        os.environ.setdefault("RAY_memory_monitor_refresh_ms", "0")
+    try:
+        ray.init(
+            address=scheduler or "local", log_to_driver=False, logging_level=logging.CRITICAL, **where
+        )  # fmt: skip
+        count = int(ray.cluster_resources().get("CPU", 0))
+    except Exception as error:
+        raise _no_answer("Ray", scheduler, error) from None
+    if not count:
+        ray.shutdown()
+        raise _no_answer("Ray", scheduler, RuntimeError("the cluster has no CPU"))
+    run = ray.remote(num_cpus=1, max_retries=3)(_called)
+    limited = min(workers or count, count)
+
+    def send(call: Callable[[], Any]) -> Future:
+        return run.remote(call).future()
+
+    return Pool(send, limited, limited if workers and scheduler else 2 * limited, ray.shutdown)
+
+
+def _called(call: Callable[[], Any]) -> Any:
+    return call()
+
+
+def _no_answer(kind: str, scheduler: str | None, error: Exception) -> DataError:
+    first = (str(error).splitlines() or [""])[0] or type(error).__name__
+    where = f"at {shown(scheduler)}" if scheduler else "on this machine"
+    return DataError(
+        f"no {kind} cluster {where} ({first}); check that it runs and has workers, and that its version "
+        "is that of this environment"
+    )

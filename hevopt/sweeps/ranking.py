@@ -1,0 +1,68 @@
+"""The best designs of a store, by objective, or by bound where bounds are all there is."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from math import inf
+from operator import attrgetter
+from typing import Any
+
+from hevopt.sweeps.prune import mean_bound, mean_objective
+from hevopt.sweeps.reading import Reader, Record
+
+
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """A design's figures, means over the cycles; objective: None where bounds are all there is.
+
+    bound: of the best plans' objective, charge-corrected as they are, or else for the charge asked at the end
+    """
+
+    design: int
+    parameters: Mapping[str, Any]
+    nox_weight: float
+    objective: float | None
+    bound: float | None
+
+
+def best_designs(reader: Reader, count: int) -> dict[float, list[Ranked]]:
+    """NOx weight -> its best designs, the best first: designs of different weights have no common objective."""
+    best: dict[float, list[Ranked]] = {}
+    for ranked in _ranked(reader):
+        if ranked.objective is not None or ranked.bound is not None:
+            listed = best.setdefault(ranked.nox_weight, [])
+            listed.append(ranked)
+            listed.sort(key=_order)
+            del listed[count:]
+    return dict(sorted(best.items()))
+
+
+def _order(ranked: Ranked) -> tuple[bool, float, int]:
+    figure = ranked.bound if ranked.objective is None else ranked.objective
+    return ranked.objective is None, inf if figure is None else figure, ranked.design
+
+
+def _ranked(reader: Reader) -> Iterator[Ranked]:
+    for design, records in groupby(reader.records(), attrgetter("design")):
+        records = list(records)
+        cycles = [list(found) for _, found in groupby(records, attrgetter("cycle"))]
+        yield Ranked(
+            design,
+            records[0].parameters,
+            records[0].nox_weight,
+            mean_objective([[_figure(r, "objective_l_per_100km") for r in of] for of in cycles]),
+            mean_bound([_bound_of_best(of) for of in cycles]),
+        )
+
+
+def _bound_of_best(records: Sequence[Record]) -> float | None:
+    solved = [r for r in records if _figure(r, "objective_l_per_100km") is not None]
+    chosen = min(solved, key=lambda r: r.row["objective_l_per_100km"]) if solved else records[0]
+    bound = _figure(chosen, "bound_l_per_100km")
+    if not solved or bound is None:
+        return bound
+    return bound - (chosen.row["fuel_l_per_100km"] - chosen.row["fuel_corrected_l_per_100km"])
+
+
+def _figure(record: Record, name: str) -> float | None:
+    return None if record.row is None else record.row.get(name)

@@ -1,0 +1,133 @@
+"""Reading a store: while a sweep writes to it, after one was killed, on a disk that cannot be written."""
+
+import json
+import os
+import shutil
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from hevopt.errors import DataError
+from hevopt.sweeps.prune import Pruned
+from hevopt.sweeps.store import check_kind, told
+
+OUTCOMES = ("ok", "infeasible", "failed", "pruned", "missing")
+_RECORDS = """
+SELECT plan.design, designs.parameters, plan.cycle, plan.strategy, plan.nox_weight,
+       CASE WHEN cases.status IS NOT NULL THEN cases.status WHEN pruned.design IS NOT NULL THEN 'pruned'
+            ELSE 'missing' END AS outcome, cases.row, cases.error, cases.seconds
+FROM plan JOIN designs ON designs.number = plan.design LEFT JOIN cases ON cases.key = plan.key
+LEFT JOIN pruned ON pruned.design = plan.design
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A case of a design. outcome: one of OUTCOMES; row: as jobs.Outcome has it; seconds: it took."""
+
+    design: int
+    parameters: Mapping[str, Any]
+    cycle: str
+    strategy: str
+    nox_weight: float
+    outcome: str
+    row: Mapping[str, Any] | None
+    error: str | None
+    seconds: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """A store as it was at one moment; `open_to_read` makes one."""
+
+    path: Path
+    connection: sqlite3.Connection
+
+    def meta(self) -> dict[str, str]:
+        """What is known of the sweep: study (its text), command, created, begun ..."""
+        with told(self.path):
+            return dict(self.connection.execute("SELECT name, value FROM meta"))
+
+    def keys(self) -> set[str]:
+        """Keys of all cases that have a result."""
+        with told(self.path):
+            return {key for (key,) in self.connection.execute("SELECT key FROM cases")}
+
+    def counts(self) -> dict[str, int]:
+        """Cases of the plan by outcome; `designs`; `other`: results of other plans or other code."""
+        query = f"SELECT outcome, count(*) FROM ({_RECORDS}) GROUP BY outcome"
+        with told(self.path):
+            counts = dict.fromkeys(OUTCOMES, 0) | dict(self.connection.execute(query))
+            for name, query in (
+                ("designs", "SELECT count(*) FROM designs"),
+                ("other", "SELECT count(*) FROM cases WHERE key NOT IN (SELECT key FROM plan)"),
+            ):
+                counts[name] = self.connection.execute(query).fetchone()[0]
+        return counts
+
+    def records(self) -> Iterator[Record]:
+        """Every case of the plan, by design, cycle and strategy."""
+        query = f"{_RECORDS} ORDER BY plan.design, plan.cycle, plan.strategy"
+        with told(self.path):
+            for design, parameters, *middle, row, error, seconds in self.connection.execute(query):
+                values = None if row is None else json.loads(row)
+                yield Record(design, json.loads(parameters), *middle, values, error, seconds)
+
+    def pruned(self) -> list[Pruned]:
+        """The designs discarded unsolved, by number."""
+        query = "SELECT design, bound, incumbent, objective FROM pruned ORDER BY design"
+        with told(self.path):
+            return [Pruned(*found) for found in self.connection.execute(query)]
+
+
+@contextmanager
+def open_to_read(path: Path) -> Iterator[Reader]:
+    """The store at a path as it is now, whatever is written to it meanwhile."""
+    try:
+        found = path.is_file()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    if not found:
+        raise DataError(f"{path}: there is no such store; check the path, or run the sweep first")
+    with ExitStack() as stack:
+        connection = _connected(path, stack)
+        check_kind(path, connection)
+        with told(path):
+            connection.execute("BEGIN")
+        yield Reader(path, connection)
+
+
+def _connected(path: Path, stack: ExitStack) -> sqlite3.Connection:
+    """A connection that changes nothing.
+
+    Beside a store SQLite wants files of its own, which the last to close it removes if it may write. Where there
+    can be none, the store cannot change either; what was not yet merged into it is merged in a copy.
+    """
+    log = path.with_name(path.name + "-wal")
+    writable = os.access(path, os.W_OK) and os.access(path.absolute().parent, os.W_OK)
+    try:
+        return _opened(path, "mode=rw" if writable else "mode=ro", stack)
+    except sqlite3.OperationalError:
+        if log.exists() and log.stat().st_size:
+            folder = Path(stack.enter_context(TemporaryDirectory(prefix="hevopt-")))
+            for file in (path, log):
+                shutil.copy(file, folder / file.name)
+            with told(path):
+                return _opened(folder / path.name, "mode=rw", stack)
+    except sqlite3.Error:
+        pass
+    with told(path):
+        return _opened(path, "immutable=1", stack)
+
+
+def _opened(path: Path, how: str, stack: ExitStack) -> sqlite3.Connection:
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?{how}", uri=True, timeout=60.0)
+    stack.callback(connection.close)
+    connection.isolation_level = None
+    connection.execute("PRAGMA query_only = ON")
+    connection.execute("SELECT count(*) FROM sqlite_master")
+    return connection

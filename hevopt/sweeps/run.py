@@ -1,0 +1,259 @@
+"""A sweep from its study to its store: plan, leave out what the store has, run the rest, store it as it comes."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import cache
+from time import monotonic
+
+from hevopt.errors import DataError
+from hevopt.provenance import digest
+from hevopt.sweeps.backends import Run, workers
+from hevopt.sweeps.child import Terms, code_digest
+from hevopt.sweeps.designs import Designs, designs_of, groups_of
+from hevopt.sweeps.jobs import BOUND, Job, Planned, jobs_of
+from hevopt.sweeps.prune import Bounded, mean_bound, mean_objective, search
+from hevopt.sweeps.store import Store
+from hevopt.sweeps.study_file import SweepStudy
+
+WORK = "hevopt.sweeps.work:run_job"
+_SAMPLES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Execution:
+    """On what a sweep runs. workers: None for all there are; timeout_s, memory_mb: of a case, see `Terms`."""
+
+    backend: str = "loky"
+    workers: int | None = None
+    scheduler: str | None = None
+    timeout_s: float | None = None
+    memory_mb: float | None = None
+    work: str = WORK
+
+    def terms(self) -> Terms:
+        """What the workers are told."""
+        return Terms(self.work, self.timeout_s, self.memory_mb, code=code_digest())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """All cases of a study: jobs that run them, and which case answers for which design."""
+
+    study: SweepStudy
+    designs: Designs
+    jobs: list[Job]
+    planned: list[Planned]
+
+    def picked(self, keys: Iterable[str]) -> Iterator[Job]:
+        """Jobs for some of the cases, each of which is run once though several jobs have it."""
+        wanted = set(keys)
+        for job in self.jobs:
+            cases = tuple(case for case in job.cases if case.key in wanted)
+            wanted.difference_update(case.key for case in cases)
+            if cases:
+                yield replace(job, cases=cases)
+
+
+@dataclass(slots=True)
+class Progress:
+    """How far a sweep is. done: cases run since `began_s` (monotonic), failed: of those; total: to run."""
+
+    total: int
+    done: int = 0
+    failed: int = 0
+    pruned: int = 0
+    began_s: float = field(default_factory=monotonic)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watch:
+    """Who looks on. progress: called some times a second; notice: what went wrong; stop: whether to end now."""
+
+    progress: Callable[[Progress], None] = lambda progress: None
+    notice: Callable[[str], None] = lambda text: None
+    stop: Callable[[], bool] = lambda: False
+
+
+class Stopped(Exception):
+    """`Watch.stop` said so; everything there was is stored."""
+
+
+def plan_of(study: SweepStudy, *, prune: bool = False) -> Plan:
+    """Every case of a study; DataError where a design is no car. prune: each design's bound is a case as well."""
+    strategies = list(study.strategies)
+    if prune and strategies == [BOUND]:
+        raise DataError(
+            f"{study.source}: --prune saves solving designs, and this study asks for bounds alone"
+        )
+    if prune and BOUND not in strategies:
+        strategies.append(BOUND)
+    designs = designs_of(study)
+    found = jobs_of(
+        study.architecture, study.cycles, strategies, groups_of(designs),
+        allow_shortfall=study.allow_shortfall,
+    )  # fmt: skip
+    jobs, planned = [], []
+    for job, cases in found:
+        jobs.append(job)
+        planned += cases
+    return Plan(study, designs, jobs, planned)
+
+
+def begin(plan: Plan, store: Store, command: str) -> None:
+    """Make a plan the store's."""
+    text = plan.study.source.read_text(encoding="utf-8-sig")
+    meta = {
+        "study": text,
+        "study_digest": digest(text),
+        "code_digest": code_digest(),
+        "command": command,
+    }
+    meta["study_file"] = str(plan.study.source.absolute())
+    store.begin(meta, ((d.number, d.values) for d in plan.designs), plan.planned)
+
+
+def settled(store: Store, *, retry_failed: bool) -> set[str]:
+    """Keys of the cases that need not be run: infeasible is a result, and failed unless it is to be tried again."""
+    return {
+        key for key, status in store.statuses().items() if status != "failed" or not retry_failed
+    }
+
+
+def run_sweep(
+    plan: Plan,
+    store: Store,
+    execution: Execution,
+    *,
+    prune: bool = False,
+    retry_failed: bool = False,
+    watch: Watch,
+) -> Progress:
+    """Run what the store lacks of a plan that it has begun, and store it as it comes.
+
+    What is stored does not depend on backend and workers, except for the seconds. Raises Stopped.
+    """
+    done = settled(store, retry_failed=retry_failed)
+    missing = {case.key for case in plan.planned} - done
+    progress = Progress(len(missing))
+    with ExitStack() as stack:
+        team = workers(
+            execution.terms(), backend=execution.backend, count=execution.workers,
+            scheduler=execution.scheduler, notice=watch.notice,
+        )  # fmt: skip
+        # With bounds and incumbents all in the store there may be nothing to start workers for.
+        team_when_needed = cache(lambda: stack.enter_context(team))
+        course = _Course(plan, store, team_when_needed, missing, progress, watch)
+        if prune:
+            _pruned(course)
+        else:
+            course.run(missing)
+    return progress
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Course:
+    """A sweep under way. workers: starts them at the first call; missing: keys of the cases still to run."""
+
+    plan: Plan
+    store: Store
+    workers: Callable[[], Run]
+    missing: set[str]
+    progress: Progress
+    watch: Watch
+
+    def run(self, keys: Iterable[str]) -> None:
+        """Run those of some cases that are missing, and store what comes."""
+        jobs = list(self.plan.picked(self.missing.intersection(keys)))
+        if not jobs:
+            return
+        arrivals = self.workers()(jobs)
+        try:
+            for outcomes in arrivals:
+                self.store.add(outcomes)
+                self.progress.done += len(outcomes)
+                self.progress.failed += sum(o.status == "failed" for o in outcomes)
+                self.missing.difference_update(o.key for o in outcomes)
+                self.watch.progress(self.progress)
+                if self.watch.stop():
+                    raise Stopped
+        finally:
+            try:
+                self.store.commit()
+            finally:
+                arrivals.close()
+
+
+def _pruned(course: _Course) -> None:
+    """Bounds first; then designs wave by wave, less those that a bound condemns."""
+    plan, store, progress = course.plan, course.store, course.progress
+    bounds: dict[int, list[str]] = {}
+    solved: dict[int, dict[str, list[str]]] = {}
+    for case in plan.planned:
+        if case.strategy == BOUND:
+            bounds.setdefault(case.design, []).append(case.key)
+        else:
+            solved.setdefault(case.design, {}).setdefault(case.cycle, []).append(case.key)
+    course.run(key for keys in bounds.values() for key in keys)
+    figures = store.figures("bound_l_per_100km", (key for keys in bounds.values() for key in keys))
+    weights = {case.design: case.nox_weight for case in plan.planned}
+    waves = search(
+        Bounded(design, weights[design], mean_bound([figures[key] for key in keys]))
+        for design, keys in bounds.items()
+    )
+    objectives = None
+    while True:
+        try:
+            wave = waves.send(objectives)
+        except StopIteration:
+            return
+        store.prune(wave.pruned)
+        for pruned in wave.pruned:
+            spared = course.missing.intersection(_all(solved[pruned.design]))
+            course.missing.difference_update(spared)
+            progress.total -= len(spared)
+            progress.pruned += len(spared)
+        course.run(key for design in wave.designs for key in _all(solved[design]))
+        objectives = {design: _objective(store, solved[design]) for design in wave.designs}
+
+
+def _all(cycles: dict[str, list[str]]) -> list[str]:
+    return [key for keys in cycles.values() for key in keys]
+
+
+def _objective(store: Store, cycles: dict[str, list[str]]) -> float | None:
+    figures = store.figures("objective_l_per_100km", _all(cycles))
+    return mean_objective([[figures[key] for key in keys] for keys in cycles.values()])
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Cases run for an estimate: how many, how long they took, and what that makes for all on one worker."""
+
+    cases: int
+    seconds: float
+    total_s: float
+
+
+def timed_sample(
+    plan: Plan, missing: set[str], execution: Execution, watch: Watch
+) -> Sample | None:
+    """A few jobs from all over the plan, run one after the other on one worker; None where none is missing.
+
+    The first one loads and compiles, and counts for the estimate only where it is alone.
+    """
+    jobs = list(plan.picked(missing))
+    if not jobs:
+        return None
+    last = len(jobs) - 1
+    places = dict.fromkeys(round(n * last / _SAMPLES) for n in range(_SAMPLES + 1))
+    chosen: Sequence[Job] = [jobs[place] for place in places]
+    spent: dict[str, float] = {}
+    with workers(execution.terms(), count=1, notice=watch.notice) as run:
+        for outcomes in run(chosen):
+            spent |= {outcome.key: outcome.seconds for outcome in outcomes}
+            if watch.stop():
+                raise Stopped
+    warm = chosen[1:] or chosen
+    mean_s = sum(spent[case.key] for job in warm for case in job.cases) / len(warm)
+    return Sample(len(spent), sum(spent.values()), mean_s * len(jobs))

@@ -1,0 +1,146 @@
+"""Stand-ins for the work of a sweep: quick, and able to do to a worker whatever a case might."""
+
+import os
+import signal
+import time
+from zlib import crc32
+
+from hevopt.sweeps.jobs import Case, Job, Outcome
+
+
+def jobs(count, cases=2, does=None):
+    """Jobs of some cases with keys k0, k1 ...; does: case number -> what `act` does in it."""
+    does = does or {}
+    made = []
+    for n in range(count):
+        numbers = range(n * cases, (n + 1) * cases)
+        acts = {f"k{i}": does[i] for i in numbers if i in does}
+        made.append(
+            Job("car", {"does": acts}, "trace", False, tuple(Case(f"k{i}", 0.0, "dp") for i in numbers))
+        )  # fmt: skip
+    return made
+
+
+def row_of(key):
+    """The row that every worker must give for a key, with a number that only full precision keeps."""
+    figure = 1 / (crc32(key.encode()) % 1000 + 3)
+    return {"strategy": "dp", "status": "ok", "objective_l_per_100km": figure,
+            "fuel_l_per_100km": figure, "fuel_corrected_l_per_100km": figure,
+            "bound_l_per_100km": figure / 2}  # fmt: skip
+
+
+def work(job, guard):
+    outcomes = []
+    for case in job.cases:
+        try:
+            with guard():
+                extra = act(job.changes.get("does", {}).get(case.key))
+        except Exception as error:
+            text = f"{type(error).__name__}: {error}"
+            outcomes.append(Outcome(case.key, "failed", None, text, 0.001))
+        else:
+            outcomes.append(Outcome(case.key, "ok", row_of(case.key) | extra, None, 0.001))
+    return outcomes
+
+
+def slow(job, guard):
+    time.sleep(0.05)
+    return work(job, guard)
+
+
+def landscape(job, guard):
+    """Objectives with one valley per NOx weight, and bounds one per cent below."""
+    cells, power_w = job.changes["battery.cells_in_series"], job.changes["machine.power_max_w"]
+    outcomes = []
+    for case in job.cases:
+        bottom = 70 if case.nox_weight else 50
+        figure = 4 + ((cells - bottom) / 40) ** 2 + ((power_w - 2e4) / 2e4) ** 2
+        row = row_of(case.key) | {
+            "objective_l_per_100km": figure,
+            "bound_l_per_100km": 0.99 * figure,
+        }
+        if case.strategy == "bound":
+            row["objective_l_per_100km"] = None
+        outcomes.append(Outcome(case.key, "ok", row, None, 0.001))
+    return outcomes
+
+
+def typical(job, guard):
+    """Rows as large as those of real cases."""
+    more = {f"figure_number_{n}_l_per_100km": 1 / (n + 3) for n in range(15)}
+    return [Outcome(c.key, "ok", row_of(c.key) | more, None, 0.001) for c in job.cases]
+
+
+def bulky(job, guard):
+    """Rows of six kilobytes, and time for the store to take them in several portions."""
+    time.sleep(0.03)
+    return [
+        Outcome(c.key, "ok", row_of(c.key) | {"more": "x" * 6000}, None, 0.1) for c in job.cases
+    ]
+
+
+def fails_when_asked(job, guard):
+    """Every third key fails for as long as a file says so."""
+    failing = os.path.exists(os.environ["SWEEP_FAILS"])
+    return [
+        Outcome(o.key, "failed", None, "asked to", 0.0)
+        if failing and crc32(o.key.encode()) % 3 == 0
+        else o
+        for o in work(job, guard)
+    ]
+
+
+def raises(job, guard):
+    raise RuntimeError("all of it")
+
+
+def forgets(job, guard):
+    return work(job, guard)[1:]
+
+
+def act(what):
+    """What one case does: nothing, tell something, or harm."""
+    match what:
+        case None:
+            pass
+        case "pids":
+            time.sleep(0.1)
+            return {"pid": os.getpid(), "worker": os.getppid()}
+        case "threads":
+            return _threads()
+        case "raise":
+            raise ValueError("not today")
+        case "hang":
+            while True:
+                time.sleep(0.01)
+        case "hang in C":
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+            while True:
+                time.sleep(10)
+        case "eat":
+            held = []
+            while True:
+                held.append(bytearray(2**24))
+        case "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        case ["die once", marker]:
+            if not os.path.exists(marker):
+                open(marker, "w").close()
+                os.kill(os.getpid(), signal.SIGKILL)
+        case "exit":
+            raise SystemExit(3)
+        case "unstorable":
+            return {"bad": object()}
+        case "nan":
+            return {"bad": float("nan")}
+    return {}
+
+
+def _threads():
+    """Threads that numerical libraries may use, and those that this process has after a product of matrices."""
+    import numba
+    import numpy as np
+
+    matrix = np.ones((500, 500))
+    matrix @ matrix
+    return {"numba": numba.get_num_threads(), "here": len(os.listdir("/proc/self/task"))}

@@ -1,0 +1,170 @@
+"""Every backend: the same outcomes, each once, in workers of their own, through whatever a case does to one."""
+
+import os
+import re
+import signal
+import sys
+import threading
+import time
+
+import pytest
+import sweep_workers
+
+from hevopt.errors import DataError, SolverError
+from hevopt.sweeps.backends import workers
+from hevopt.sweeps.child import Terms
+from hevopt.sweeps.pools import check_backend
+
+WORK = Terms("sweep_workers:work")
+
+
+def outcomes_of(jobs, terms=WORK, **options):
+    with workers(terms, **options) as run:
+        return [outcome for found in run(jobs) for outcome in found]
+
+
+def by_key(outcomes):
+    """The outcomes by key, none of which may have come twice."""
+    outcomes = list(outcomes)
+    found = {outcome.key: outcome for outcome in outcomes}
+    assert len(found) == len(outcomes)
+    return found
+
+
+def alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def ended(pids, within_s=5.0):
+    deadline = time.monotonic() + within_s
+    while any(map(alive, pids)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not any(map(alive, pids))
+
+
+@pytest.mark.parametrize(("backend", "count"), [("loky", 2), ("loky", 1), ("dask", 2), ("ray", 2)])
+def test_a_backend_has_as_many_workers_as_asked_outside_this_process(backend, count, monkeypatch):
+    # Ray's workers do not share this process' path.
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
+    jobs = sweep_workers.jobs(12, 2, dict.fromkeys(range(0, 24, 2), "pids"))
+    with workers(WORK, backend=backend, count=count) as run:
+        found = by_key(outcome for outcomes in run(jobs) for outcome in outcomes)
+        again = by_key(outcome for outcomes in run(jobs[:2]) for outcome in outcomes)
+    assert set(found) == {f"k{n}" for n in range(24)}
+    for key, outcome in found.items():
+        assert outcome.status == "ok" and sweep_workers.row_of(key).items() <= outcome.row.items()
+    pids = {o.row["pid"] for o in found.values() if "pid" in o.row}
+    homes = {o.row["worker"] for o in found.values() if "pid" in o.row}
+    assert len(pids) == len(homes) == count
+    assert os.getpid() not in pids | homes
+    assert {o.row["pid"] for o in again.values() if "pid" in o.row} <= pids
+    assert ended(pids | homes)
+
+
+def test_a_worker_computes_with_one_thread():
+    (outcome,) = outcomes_of(sweep_workers.jobs(1, 1, {0: "threads"}), count=1)
+    # For compiled loops; and there is none that a product of matrices has started.
+    assert (outcome.row["numba"], outcome.row["here"]) == (1, 1)
+
+
+def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_path):
+    marker = str(tmp_path / "died")
+    does = {
+        1: "raise", 4: "hang", 8: "hang in C", 13: "die", 17: "unstorable", 20: "nan", 25: "exit",
+        30: ["die once", marker], 34: "eat",
+    }  # fmt: skip
+    terms = Terms("sweep_workers:work", timeout_s=0.5, memory_mb=700, loading_s=0.0)
+    found = by_key(outcomes_of(sweep_workers.jobs(20, 2, does), terms, count=2))
+    assert set(found) == {f"k{n}" for n in range(40)}
+    errors = {int(key[1:]): o.error for key, o in found.items() if o.status == "failed"}
+    # An exit is the end of a job's process: the other case of the job is not to blame, but has no outcome either.
+    assert set(errors) == set(does) - {30} | {24}
+    expected = {
+        1: "not today", 4: "more than 0.5 s", 8: "more than 0.5 s", 13: "signal 9.*twice", 17: "cannot be stored",
+        20: "cannot be stored", 25: "SystemExit", 34: "MemoryError",
+    }  # fmt: skip
+    for number, words in expected.items():
+        assert re.search(words, errors[number]), errors[number]
+    assert os.path.exists(marker)
+
+
+@pytest.mark.parametrize(("work", "words"), [("raises", "all of it"), ("forgets", "no outcome")])
+def test_work_that_breaks_its_promise_gives_failures(work, words):
+    found = by_key(outcomes_of(sweep_workers.jobs(1), Terms(f"sweep_workers:{work}"), count=1))
+    assert words in found["k0"].error
+    assert found["k1"].status == ("failed" if work == "raises" else "ok")
+
+
+@pytest.mark.parametrize(
+    ("terms", "words"),
+    [
+        (Terms("sweep_workers:absent"), "absent"),
+        (Terms("sweep_workers:work", memory_mb=20), "allow more"),
+        (Terms("sweep_workers:work", code="other"), "not those that this process started with"),
+    ],
+)
+def test_workers_that_cannot_start_are_an_error_and_not_failed_cases(terms, words):
+    with pytest.raises(SolverError, match=words):
+        outcomes_of(sweep_workers.jobs(4), terms, count=1)
+
+
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_killed_workers_lose_nothing_and_double_nothing(backend):
+    """Both what holds a worker up and what it holds: the jobs under way are run again."""
+    notices = []
+    jobs = sweep_workers.jobs(40, 1, dict.fromkeys(range(40), "pids"))
+    outcomes, killed = [], set()
+    with workers(WORK, backend=backend, count=2, notice=notices.append) as run:
+        for found in run(jobs):
+            outcomes += found
+            for outcome in found:
+                victim = outcome.row["worker" if len(killed) % 2 else "pid"]
+                if len(outcomes) > 10 * (len(killed) + 1) and len(killed) < 2 and alive(victim):
+                    os.kill(victim, signal.SIGKILL)
+                    killed.add(victim)
+    assert len(killed) == 2
+    found = by_key(outcomes)
+    assert set(found) == {f"k{n}" for n in range(40)}
+    assert {o.status for o in outcomes} == {"ok"}
+    assert bool(notices) == (backend == "loky") and all("run again" in text for text in notices)
+
+
+def test_closed_early_the_workers_are_gone_and_what_came_is_kept():
+    jobs = sweep_workers.jobs(400, 1, dict.fromkeys(range(400), "pids"))
+    began = time.monotonic()
+    outcomes = []
+    with workers(WORK, count=2) as run:
+        arrivals = run(jobs)
+        for found in arrivals:
+            outcomes += found
+            if len(outcomes) > 5:
+                break
+        arrivals.close()
+    assert time.monotonic() - began < 15  # all of them take 20 s
+    assert ended({o.row[name] for o in outcomes for name in ("pid", "worker")})
+    assert threading.active_count() < 10
+
+
+def test_the_caller_is_heard_while_nothing_comes():
+    with workers(Terms("sweep_workers:slow"), count=1) as run:
+        assert [] in list(run(sweep_workers.jobs(12, 1)))
+
+
+@pytest.mark.parametrize(
+    ("backend", "scheduler", "words"),
+    [("threads", None, "loky, dask, ray"), ("loky", "tcp://here:1", "this machine alone")],
+)
+def test_a_backend_that_cannot_be_is_a_users_mistake(backend, scheduler, words):
+    with pytest.raises(DataError, match=words):
+        check_backend(backend, scheduler)
+
+
+@pytest.mark.parametrize(("backend", "module"), [("dask", "distributed"), ("ray", "ray")])
+def test_a_missing_backend_is_told_with_the_command_that_installs_it(monkeypatch, backend, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(DataError, match=rf'pip install "hevopt\[{backend}\]"'):
+        check_backend(backend, None)

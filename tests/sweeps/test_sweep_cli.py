@@ -1,0 +1,224 @@
+"""`hevopt sweep` as it is called: what it prints, writes and returns, and what it says to a user's mistakes."""
+
+import csv
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+
+import pyarrow.parquet as pq
+import pytest
+from sweep_runs import gone, run, start, stored, sweep_here, table, wait_for_results, write_study
+
+from hevopt.cli import main
+from hevopt.commands import sweep_view
+from hevopt.sweeps.lock import locked
+from hevopt.sweeps.run import Progress
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A finished sweep: its study, its store, what it said, its table."""
+    folder = tmp_path_factory.mktemp("swept")
+    study, out = write_study(folder, 3, 2), folder / "cases.csv"
+    said = run(study, "--jobs", "1", "--export", str(out))[0]
+    return study, folder / "study.sqlite", said, out
+
+
+def called(monkeypatch, capsys, *words):
+    """Exit status, stdout and stderr of a command run in this process."""
+    monkeypatch.setattr(sys, "argv", ["hevopt", "sweep", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return ended.value.code, *capsys.readouterr()
+
+
+def test_a_sweep_says_what_came_of_it_and_where_it_is(swept):
+    study, store, said, out = swept
+    assert "12 cases run in" in said and "0 of them failed" in said
+    assert "12 cases of 12 designs: 12 ok" in said and "best designs of each NOx weight" in said
+    assert f"--store {store} --export" in said and f"hevopt report {store}" in said
+    assert sorted(p.name for p in study.parent.iterdir()) == [
+        "cases.csv", "short.csv", "study.sqlite", "study.toml",
+    ]  # fmt: skip
+    lines = list(csv.DictReader(out.read_text().splitlines()))
+    assert [int(line["design"]) for line in lines] == list(range(12))
+    assert {line["battery.cells_in_series"] for line in lines} == {"32", "64", "96"}
+    for line in lines:
+        assert line["outcome"] == "ok" and line["strategy"] == "ecms" and line["error"] == ""
+        bound = float(line["bound_l_per_100km"])
+        assert 0 < bound and float(line["gap_percent"]) > -1e-9
+
+
+def test_run_again_it_has_nothing_to_do_and_prints_the_same_best_designs(
+    swept, monkeypatch, capsys
+):
+    study, _, said, _ = swept
+    status, out, _ = called(monkeypatch, capsys, study)
+    assert status == 0 and "0 cases run" in out
+    assert out[out.index("best") : out.index("12 cases of")] in said
+
+
+def test_status_and_export_need_the_store_alone(swept, monkeypatch, capsys, tmp_path):
+    study, store, _, _ = swept
+    status, out, err = called(monkeypatch, capsys, "--status", store)
+    assert (status, err) == (0, "") and "12 cases of 12 designs: 12 ok" in out and str(study) in out
+    exported = tmp_path / "again.csv"
+    assert called(monkeypatch, capsys, "--store", store, "--export", exported)[0] == 0
+    assert [line[:-1] for line in csv.reader(exported.read_text().splitlines())] == table(store)
+
+
+def test_parquet_has_the_columns_and_numbers_of_csv(swept, monkeypatch, capsys, tmp_path):
+    out = tmp_path / "cases.parquet"
+    assert called(monkeypatch, capsys, "--store", swept[1], "--export", out)[0] == 0
+    read = pq.read_table(out)
+    lines = table(swept[1])
+    assert read.column_names[:-1] == lines[0]
+    column = lines[0].index("objective_l_per_100km")
+    assert read["objective_l_per_100km"].to_pylist() == [float(line[column]) for line in lines[1:]]
+    assert read["battery.cells_in_series"].to_pylist()[0] == 32
+
+
+def test_a_dry_run_tells_what_would_run_and_stores_nothing(tmp_path, monkeypatch, capsys):
+    constraint = 'constraints = ["battery.cells_in_series * 300 <= machine.power_max_w"]'
+    study = write_study(tmp_path, 3, 2, ("ecms", "dp"), constraint)
+    status, out, err = called(monkeypatch, capsys, study, "--dry-run", "--jobs", "2")
+    assert status == 0, err
+    # 8 kW is too little for all of 32, 64, 96 cells; 30 kW is enough for each.
+    assert out.startswith(
+        "6 designs, 6 more excluded by constraints; 12 cases, 0 of them in the store"
+    )
+    assert out.count("  design ") == 5 and "machine.power_max_w = 30000" in out
+    assert "timed sample: 12 cases" in out and "on one worker" in out and "on 2" in out
+    assert not (tmp_path / "study.sqlite").exists()
+
+
+def test_infeasible_designs_are_results_and_failed_ones_are_not(tmp_path, monkeypatch, capsys):
+    study = write_study(tmp_path, 2, 2)
+    # The first case of a process, which loads and compiles, has a minute more.
+    out, _ = run(study, "--jobs", "1", "--timeout", "0.001", status=4)
+    assert "8 cases of 8 designs: 1 ok, 7 failed" in out and "--retry-failed" in out
+    assert "failed 7 times, first in design" in out and "timeout: took more than 0.001 s" in out
+    sweep_here(study, tmp_path / "all.sqlite", "raises", workers=1)
+    status, out, _ = called(monkeypatch, capsys, study, "--store", tmp_path / "all.sqlite")
+    assert status == 3 and "8 failed" in out and "all of it" in out
+    # A cycle that no such car can follow.
+    (tmp_path / "short.csv").write_text(
+        "time_s,speed_mps\n0,0\n1,18\n2,36\n3,54\n4,36\n5,18\n6,0\n"
+    )
+    status, out, err = called(monkeypatch, capsys, study, "--jobs", "1")
+    assert status == 0 and "8 cases of 8 designs: 8 infeasible; 8 results of other inputs" in out
+    assert "none of this study as it is now" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "name a study"),
+        (["absent.toml"], "absent.toml"),
+        (["study.toml", "--status", "s.sqlite"], "stands alone"),
+        (["--status", "absent.sqlite"], "no such store"),
+        (["--status", "study.toml"], "nor an SQLite file"),
+        (["study.toml", "--backend", "slurm"], "loky, dask, ray"),
+        (["study.toml", "--scheduler", "tcp://a:1"], "this machine alone"),
+        (["study.toml", "--export", "a.xlsx"], ".csv or .parquet"),
+        (["study.toml", "--export", "absent/a.csv"], "No such folder"),
+        (["study.toml", "--store", "study.toml"], "one file"),
+        (["study.toml", "--store", "short.csv"], "nor an SQLite file"),
+        (["study.toml", "--store", "done.sqlite", "--no-resume"], "asks for a new store"),
+        (["--store", "done.sqlite", "--export", "done.sqlite"], ".csv or .parquet"),
+    ],
+)
+def test_a_users_mistake_is_one_message_and_status_2(
+    words, message, swept, tmp_path, monkeypatch, capsys
+):
+    write_study(tmp_path, 2, 2)
+    (tmp_path / "done.sqlite").write_bytes(swept[1].read_bytes())
+    before = {p: p.read_bytes() for p in tmp_path.iterdir()}
+    monkeypatch.chdir(tmp_path)
+    status, out, err = called(monkeypatch, capsys, *words)
+    assert (status, out) == (2, "")
+    assert err.startswith("hevopt: error: ") and message in err and "Traceback" not in err
+    assert {p: p.read_bytes() for p in tmp_path.iterdir()} == before
+
+
+def test_a_second_sweep_on_a_store_is_refused(swept, monkeypatch, capsys):
+    with locked(swept[1]):
+        status, _, err = called(monkeypatch, capsys, swept[0])
+    assert status == 2 and f"process {os.getpid()} on" in err
+
+
+def test_a_cluster_that_does_not_answer_is_told(swept, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("hevopt.sweeps.pools._CONNECT_S", 0.5)
+    words = [
+        "--backend",
+        "dask",
+        "--scheduler",
+        "tcp://127.0.0.1:9",
+        "--store",
+        tmp_path / "s.sqlite",
+    ]
+    status, _, err = called(monkeypatch, capsys, swept[0], *words)
+    assert status == 2 and "no Dask cluster at 'tcp://127.0.0.1:9'" in err
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_asked_to_end_it_stores_all_it_has_and_leaves_no_process(tmp_path, name):
+    study, store = write_study(tmp_path, 33, 40), tmp_path / "study.sqlite"
+    process = start(study, "--jobs", "2")
+    wait_for_results(process, store, 1)
+    if name == "SIGINT":
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    else:
+        process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 4, err
+    assert "the same command goes on from there" in out and "Traceback" not in err
+    assert gone(process)
+    assert 0 < stored(store) < 2640
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["short.csv", "study.sqlite", "study.toml"]
+
+
+def test_progress_is_a_line_every_ten_seconds_where_there_is_no_terminal(capsys, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(sweep_view, "monotonic", lambda: now[0])
+    with sweep_view.SweepProgress() as shown:
+        progress = Progress(total=100, began_s=100.0)
+        for second in range(25):
+            now[0] = 100.0 + second
+            progress.done, progress.failed = 2 * second, 1
+            shown(progress)
+    assert capsys.readouterr().err.splitlines() == [
+        "hevopt: 20 of 100 cases, 2/s, 40 s left, 1 failed",
+        "hevopt: 40 of 100 cases, 2/s, 30 s left, 1 failed",
+    ]
+
+
+def test_on_a_terminal_it_is_a_bar_with_the_same_figures():
+    master, slave = pty.openpty()
+    code = (
+        "import time\nfrom hevopt.commands.sweep_view import SweepProgress\n"
+        "from hevopt.sweeps.run import Progress\n"
+        "with SweepProgress() as shown:\n"
+        "    p = Progress(total=10, began_s=time.monotonic() - 2)\n"
+        "    p.done, p.failed = 4, 1\n    shown(p)\n    shown.say('a worker was lost')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], stderr=slave, env=os.environ | {"TERM": "xterm"}
+    )
+    os.close(slave)
+    time.sleep(0.1)
+    text = os.read(master, 100_000).decode()
+    os.close(master)
+    assert done.returncode == 0
+    assert "4/10" in text and "left, 1 failed" in text and "hevopt: a worker was lost" in text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.5, "0.5 s"), (42.3, "42 s"), (200, "3 min 20 s"), (18120, "5 h 2 min"), (3e5, "3 d 11 h")],
+)
+def test_durations_are_written_as_one_reads_them(seconds, text):
+    assert sweep_view.duration(seconds) == text
