@@ -1,0 +1,85 @@
+"""The fuzzer: spoils good files in many ways and checks that hevopt answers each with a result or one message.
+
+    python tests/fuzzing/run.py --count 10000 --seed 1
+
+Case n of a seed is always the same. Exit status 1 and the spoilt files in --keep where something was wrong.
+"""
+
+import argparse
+import random
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from fuzzing.corpus import SHORT_CYCLE, Seed, seeds
+from fuzzing.mutations import COMMON, RARE, RARE_EVERY
+from fuzzing.runner import fault_of, run
+
+
+def spoilt(
+    seed: int, case: int, files: list[Seed], *, rare: bool
+) -> tuple[Seed, bytes, list[str], str]:
+    """Case n: the good file, its spoilt contents, the command, and what was done to it."""
+    rng = random.Random(f"{seed}/{case}")
+    good = rng.choice(files)
+    kinds = (
+        RARE if rare and case % RARE_EVERY == 0 else rng.choices(COMMON, k=rng.choice((1, 1, 2, 3)))
+    )
+    contents = good.contents
+    for mutation in kinds:
+        contents = mutation(contents, rng)
+    return good, contents, list(rng.choice(good.commands)), "+".join(m.__name__ for m in kinds)
+
+
+def fuzz(seed: int, cases: range, keep: Path | None, *, rare: bool) -> tuple[list[str], Counter]:
+    """Descriptions of all cases with a fault, and how often each status came."""
+    _load_compiled_parts()
+    files, faults, statuses = seeds(), [], Counter()
+    for case in cases:
+        good, contents, words, how = spoilt(seed, case, files, rare=rare)
+        with tempfile.TemporaryDirectory(prefix="hevopt-fuzz-") as name:
+            folder = Path(name)
+            (folder / good.name).write_bytes(contents)
+            seen = run(words, folder)
+            statuses[f"{words[0]} {seen.status}"] += 1
+            fault = fault_of(seen)
+            if fault:
+                last = (seen.err.strip().splitlines() or [""])[-1][:300]
+                faults.append(f"case {case}: {' '.join(words)}; {how}: {fault}; {last}")
+                if keep:
+                    keep.mkdir(parents=True, exist_ok=True)
+                    shutil.copy(folder / good.name, keep / f"{case}-{good.name}")
+    return faults, statuses
+
+
+def _load_compiled_parts() -> None:
+    """So that the children, which share this process's memory, need not."""
+    from hevopt import compare
+
+    compare(SHORT_CYCLE, ["A", "C2"], ["conventional", "ecms"], allow_shortfall=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="spoils files and checks what hevopt says")
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument(
+        "--first", type=int, default=0, help="first case, to go on or to repeat one"
+    )
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", type=Path, help="folder for the files of faulty cases")
+    chosen = parser.parse_args()
+    cases = range(chosen.first, chosen.first + chosen.count)
+    faults, statuses = fuzz(chosen.seed, cases, chosen.keep, rare=True)
+    for name, count in sorted(statuses.items()):
+        print(f"{count:6} {name}")
+    print(f"{len(faults)} faults in {chosen.count} cases", *faults, sep="\n")
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()
