@@ -13,6 +13,7 @@ whose battery drives (any function beyond start_stop); those of A and B carry th
 own. The cost of a shift is for cars whose gear is free.
 """
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -40,6 +41,7 @@ KEYS = {
     "soc_end": "battery.soc.end",
 }
 # Keys of files that are none of compare's, and where to give them instead.
+_NAME_OR_PATH = re.compile(r"[A-Za-z_./~][\w./~ -]*")
 _OTHER_FILES = {
     "coupling": "an architecture; give the file with --architectures",
     "parameters": "a study file of sweep; give the file to hevopt sweep",
@@ -139,7 +141,10 @@ def settings_of(place: str, contents: Mapping[str, Any]) -> Settings:
 
 
 def assignments(texts: Sequence[str]) -> dict[str, Any]:
-    """Key path -> value of texts such as `machine.power_max_w=2e4`; the value is written as in TOML."""
+    """Key path -> value of texts such as `machine.power_max_w=2e4`.
+
+    The value is written as in TOML, but a name or a path needs no quotes, which a shell takes away.
+    """
     changes: dict[str, Any] = {}
     for text in texts:
         key, equals, value = text.partition("=")
@@ -156,11 +161,11 @@ def _toml_value(key: str, text: str) -> Any:
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        found = {}
+        found = {"value": text} if _NAME_OR_PATH.fullmatch(text) else {}
     if list(found) != ["value"]:
         raise DataError(
             f"--set {printable(key)}={shown(text)[1:-1]}: not a value; allowed: a number, true, false, a list "
-            f"[1, 2], a table {{ a = 1 }}, or text in quotes, as --set '{printable(key)}=\"text\"'"
+            f"[1, 2], a table {{ a = 1 }}, a name or path, or text in quotes, as --set '{printable(key)}=\"text\"'"
         )
     return found["value"]
 

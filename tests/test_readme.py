@@ -13,22 +13,22 @@ from hevopt.cli import main
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
-SHELL = [
-    line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines()
-]
-COMMANDS = [line for line in SHELL if line.startswith("hevopt ")]
-SET_UPS = [line for line in SHELL if not line.startswith("hevopt ")]
+BLOCKS = [block.splitlines() for block in re.findall(r"```sh\n(.*?)```", README, re.S)]
+# Blocks of commands, each run from top to bottom in one folder; the two that set up are CI's.
+SESSIONS = [block for block in BLOCKS if block[0].startswith("hevopt ")]
+SET_UPS = [line for block in BLOCKS if block not in SESSIONS for line in block]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_command_of_the_readme_works(command, monkeypatch, tmp_path, capsys):
-    for folder in ("architectures", "cycles"):
+@pytest.mark.parametrize("session", SESSIONS, ids=lambda session: " ".join(session[0].split()[1:3]))
+def test_commands_of_the_readme_work(session, monkeypatch, tmp_path, capsys):
+    for folder in ("architectures", "cycles", "examples"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", shlex.split(command))
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert not stop.value.code, capsys.readouterr().err
+    for command in session:
+        monkeypatch.setattr("sys.argv", shlex.split(command))
+        with pytest.raises(SystemExit) as stop:
+            main()
+        assert not stop.value.code, f"{command}: {capsys.readouterr().err}"
 
 
 @pytest.mark.parametrize("example", re.findall(r"```python\n(.*?)```", README, re.S))

@@ -129,6 +129,21 @@ def _relax(best, value, cost, low, high, cells, share, share_slope):
         here[j] = min(here[j], candidate)
 
 
+@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+def _line(best, low, high, start, slope):
+    """best[j] = min(best[j], start + slope (j - low)) for low <= j < high."""
+    here = best[low:high]
+    for j in range(high - low):
+        here[j] = min(here[j], start + slope * j)
+
+
+@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+def _lower(best, other, extra):
+    """best[j] = min(best[j], other[j] + extra)."""
+    for j in range(len(best)):
+        best[j] = min(best[j], other[j] + extra)
+
+
 @compiled()
 def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
     """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away.
@@ -149,15 +164,17 @@ def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
         run = max(run, j + 1)
         bottom = min(max(j, -cells), run)
         top = max(min(run, nodes - 1 - cells), bottom)
-        for i in range(j, bottom):
-            below = -(i + start + slope * (i - low))
-            best[i] = min(best[i], cost + value[0] + floor_kg * below)
+        if bottom > j:
+            below = -(j + start + slope * (j - low))
+            at_first = cost + value[0] + floor_kg * below
+            _line(best, j, bottom, at_first, -floor_kg * (1.0 + slope))
         if top > bottom:
             first_share = start + slope * (bottom - low) - cells
             _relax(best, value, cost, bottom, top, cells, first_share, slope)
-        for i in range(top, run):
-            above = i + start + slope * (i - low) - (nodes - 1)
-            best[i] = min(best[i], cost + value[nodes - 1] + ceiling_kg * above)
+        if run > top:
+            above = top + start + slope * (top - low) - (nodes - 1)
+            at_first = cost + value[nodes - 1] + ceiling_kg * above
+            _line(best, top, run, at_first, ceiling_kg * (1.0 + slope))
         j = run
 
 
@@ -221,6 +238,5 @@ def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low,
             value[k, m] = unreachable_kg
             for n in range(modes):
                 if allowed[m, n]:
-                    for j in range(nodes):
-                        value[k, m, j] = min(value[k, m, j], switch_kg[m, n] + least[n, j])
+                    _lower(value[k, m], least[n], switch_kg[m, n])
     return value

@@ -22,7 +22,8 @@ _STATUSES = (0, 2, 3)
 
 @dataclass(frozen=True)
 class Seen:
-    """What a command did: status (negative: killed by a signal), what it printed, time, highest memory."""
+    """What a command did: status (negative: killed by a signal), what it printed, time, highest memory beyond
+    that of the process it was forked from."""
 
     status: int
     out: str
@@ -59,6 +60,7 @@ def run(words: Sequence[str], folder: Path) -> Seen:
         began = time.monotonic()
         sys.stdout.flush()
         sys.stderr.flush()
+        shared = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
         child = os.fork()
         if child == 0:
             _child(words, folder, out.fileno(), err.fileno())
@@ -77,7 +79,7 @@ def run(words: Sequence[str], folder: Path) -> Seen:
             out.read().decode(errors="replace"),
             err.read().decode(errors="replace"),
             seconds,
-            usage.ru_maxrss * 1024,
+            max(0, usage.ru_maxrss * 1024 - shared),
         )
 
 

@@ -164,7 +164,7 @@ def test_a_wrong_list_or_range_is_refused_with_what_is_allowed(fault, value, wor
             "[parameters]\nmachine.power_max_w = [1e4]\n'machine.power_max_w' = [2e4]",
             "'machine.power_max_w' is given twice",
         ),
-        ("[parameters]\n" + ".".join("a" * 12) + " = [1]", "from is missing"),
+        ("[parameters]\n" + ".".join("a" * 12) + " = [1]", "nested too deeply"),
         ("[parameters]\n'machine.' = [1]\n", "parameters.machine. = 1"),
     ],
 )
