@@ -1,9 +1,8 @@
 """`hevopt compare`, `run` and `table`: one cycle, solved."""
 
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -16,11 +15,6 @@ from hevopt.commands.options import (
     takes_settings,
 )
 from hevopt.commands.terminal import Progress, check_out, listed, show, write
-from hevopt.errors import DataError
-
-if TYPE_CHECKING:
-    from hevopt.cycle import Cycle
-    from hevopt.study_file import Cars, Settings
 
 _OPTIONS = "the command line"
 
@@ -70,9 +64,8 @@ def compare(
     ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
-    from hevopt import outputs, report, study
-    from hevopt.commands.reporting import check_files, command_line, write_files
-    from hevopt.commands.studies import with_studies
+    from hevopt import study
+    from hevopt.commands.comparing import Files, Job, show_comparison
     from hevopt.cycle import load_cycle
     from hevopt.study_file import Settings, cars_of, read_study, settings_of
 
@@ -86,33 +79,13 @@ def compare(
     options = given | {name: value for name, value in named.items() if value is not None}
     settings = Settings() if study_path is None else read_study(study_path)
     settings = settings.joined(settings_of(_OPTIONS, options))
-    cars = cars_of(settings)
-    trace = load_cycle(settings.get("cycle", "nedc"))
-    about = _about(cars, trace, settings)
-    _check_tables({"--out": out, "--out-steps": steps}, {"--report": page, "--save": save}, about)
-    keep = page is not None or save is not None
-    if (fronts or effects) and not keep:
-        raise DataError(
-            "--fronts and --sensitivity add to the page; name it with --report or --save"
-        )
-    observers, driven = [], []
-    if keep:
-        from hevopt.pages.collect import Collector, check_steps
-
-        check_steps(trace)
-        check_files(page, save, [str(car.source) for car in cars.cars], str(trace.source))
-        collector = Collector()
-        observers.append(collector.observe)
-    if steps is not None:
-        observers.append(
-            lambda case, row, plan, trajectory: driven.append(
-                (row, outputs.step_columns(trace, case.problem, trajectory))
-            )
-        )
+    job = Job(cars_of(settings), load_cycle(settings.get("cycle", "nedc")), settings)
+    files = Files(out, steps, page, save, fronts, effects)
+    files.check(job)
     with Progress() as progress:
         comparison = study.compare(
-            trace,
-            cars.cars,
+            job.trace,
+            job.cars.cars,
             settings.get("strategies", None),
             nox_weight=settings.get("nox_weight", 0.0),
             allow_shortfall=settings.get("allow_shortfall", False),
@@ -120,36 +93,9 @@ def compare(
             refine=settings.get("refine", False),
             horizon_s=settings.get("horizon_s", None),
             progress=progress,
-            observe=lambda *solved: [observer(*solved) for observer in observers],
+            observe=files.observe,
         )
-    lines = []
-    if keep:
-        results = collector.results(
-            comparison,
-            command_line(),
-            changes=_changed(cars),
-            others=[settings.file] if settings.file is not None else [],
-            published=not any(cars.changes.values()),
-        )
-        results = with_studies(results, cars, trace, settings, fronts=fronts, effects=effects)
-        lines = write_files(results, page, save)
-    if out is not None:
-        outputs.write_rows(out, comparison, about)
-        lines.append(f"rows written to {out}")
-    if steps is not None:
-        outputs.write_steps(steps, comparison, outputs.joined(driven), about)
-        lines.append(f"steps written to {steps}")
-    if json:
-        write(outputs.result_json(comparison, about))
-    else:
-        show(report.comparison_table(comparison))
-        write("\n".join([report.comparison_notes(comparison), *_changed(cars)]) + "\n")
-        # Published figures are those of the shipped cars.
-        published = None if any(cars.changes.values()) else report.published_table(comparison)
-        if published is not None:
-            show(published)
-        for line in lines:
-            write(line)
+    show_comparison(job, comparison, files.write(job, comparison), json=json)
     for case, error in comparison.failures.items():
         print(f"hevopt: {case}: {error}", file=sys.stderr)
     if comparison.failures:
@@ -175,6 +121,7 @@ def run(
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
     from hevopt import outputs, report, study
+    from hevopt.commands.comparing import Job
     from hevopt.cycle import load_cycle
     from hevopt.strategies import strategy_named
     from hevopt.study_file import cars_of, settings_of
@@ -183,9 +130,8 @@ def run(
     named = {"refine": refine, "horizon_s": horizon}
     options = given | {name: value for name, value in named.items() if value is not None}
     settings = settings_of(_OPTIONS, options)
-    cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
-    car = cars.cars[0]
-    about = _about(cars, trace, settings)
+    job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
+    car, trace = job.cars.cars[0], job.trace
     if out is not None:
         check_out(out, architecture, cycle)
         outputs.check_table_file(out)
@@ -204,12 +150,12 @@ def run(
     comparison = study.Comparison(trace.name, [row], {}, nox_weight, "nothing, a single run")
     if out is not None:
         columns = outputs.step_columns(trace, case.problem, trajectory)
-        outputs.write_steps(out, comparison, columns, about)
+        outputs.write_steps(out, comparison, columns, job.about)
     if json:
-        write(outputs.result_json(comparison, about))
+        write(outputs.result_json(comparison, job.about))
         return
     show(report.comparison_table(comparison))
-    write("\n".join([report.comparison_notes(comparison), *_changed(cars)]))
+    write("\n".join([report.comparison_notes(comparison), *job.changed()]))
     calibration = report.calibration_table(plan)
     if calibration is not None:
         show(calibration)
@@ -244,53 +190,3 @@ def table(
     write(
         f"{steps} steps x {controls} controls written to {out}; its README entry names the arrays"
     )
-
-
-def _about(cars: "Cars", trace: "Cycle", settings: "Settings") -> dict[str, Any]:
-    """What a result comes from: digests of the files read, versions, and the settings that are not in a file."""
-    from hevopt.provenance import files_digests, versions
-
-    own = [settings.file] if settings.file is not None else []
-    shared = {"nox_weight": 0.0, "allow_shortfall": False, "free_gear": False, "refine": False}
-    return {
-        "inputs": dict(files_digests(cars.cars, [trace], own)),
-        "versions": versions(),
-        "settings": {
-            **{name: settings.get(name, default) for name, default in shared.items()},
-            "horizon_s": settings.get("horizon_s", None),
-            "changes": cars.changes,
-            "left_out": cars.left_out,
-        },
-    }
-
-
-def _check_tables(
-    outs: Mapping[str, Path | None], others: Mapping[str, Path | None], about: Mapping[str, Any]
-) -> None:
-    """DataError, before anything is solved, where a table cannot be written, or over an input or another file."""
-    from hevopt.outputs import check_table_file
-    from hevopt.writing import check_writable
-
-    taken = {Path(name).resolve(): "an input" for name in about["inputs"]}
-    taken |= {p.resolve(): f"the file of {o} as well" for o, p in others.items() if p is not None}
-    for option, out in outs.items():
-        if out is not None:
-            target = check_writable(out)
-            if target in taken:
-                raise DataError(f"{option} {out} is {taken[target]}; choose another")
-            check_table_file(out)
-            taken[target] = f"the file of {option} as well"
-
-
-def _changed(cars: "Cars") -> list[str]:
-    """Lines that say what was changed in the cars, and what was left out."""
-    said: dict[str, list[str]] = {}
-    for car, changes in cars.changes.items():
-        for key, value in changes.items():
-            said.setdefault(f"{key} = {value}", []).append(car)
-    every = len(cars.changes)
-    lines = [
-        f"set: {change}" + ("" if len(names) == every else f" in {', '.join(names)}")
-        for change, names in said.items()
-    ]
-    return lines + cars.left_out

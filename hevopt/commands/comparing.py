@@ -1,0 +1,165 @@
+"""What `hevopt compare` is told, the files it leaves behind, and what it prints."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hevopt.commands.reporting import check_files, command_line, write_files
+from hevopt.commands.terminal import show, write
+from hevopt.errors import DataError
+
+if TYPE_CHECKING:
+    from hevopt.cycle import Cycle
+    from hevopt.pages.collect import Collector
+    from hevopt.problem import Plan, Trajectory
+    from hevopt.study import Case, Comparison, Row
+    from hevopt.study_file import Cars, Settings
+
+_SHARED = {"nox_weight": 0.0, "allow_shortfall": False, "free_gear": False, "refine": False}
+
+
+@dataclass(frozen=True)
+class Job:
+    """Cars on a cycle, and the settings that they are solved with."""
+
+    cars: "Cars"
+    trace: "Cycle"
+    settings: "Settings"
+
+    @cached_property
+    def about(self) -> dict[str, Any]:
+        """What a result comes from: digests of the files read, versions, and the settings made."""
+        from hevopt.provenance import files_digests, versions
+
+        settings = self.settings
+        own = [settings.file] if settings.file is not None else []
+        return {
+            "inputs": dict(files_digests(self.cars.cars, [self.trace], own)),
+            "versions": versions(),
+            "settings": {
+                **{name: settings.get(name, default) for name, default in _SHARED.items()},
+                "horizon_s": settings.get("horizon_s", None),
+                "changes": self.cars.changes,
+                "left_out": self.cars.left_out,
+            },
+        }
+
+    def changed(self) -> list[str]:
+        """Lines that say what was changed in the cars, and what was left out."""
+        said: dict[str, list[str]] = {}
+        for car, changes in self.cars.changes.items():
+            for key, value in changes.items():
+                said.setdefault(f"{key} = {value}", []).append(car)
+        every = len(self.cars.changes)
+        lines = [
+            f"set: {change}" + ("" if len(names) == every else f" in {', '.join(names)}")
+            for change, names in said.items()
+        ]
+        return lines + self.cars.left_out
+
+
+@dataclass
+class Files:
+    """Where results go, None for nowhere, and what of the solved cases they need.
+
+    out: rows; steps: every step of every row; page, save: the report and what it is made from, with fronts and
+    effects (sensitivities) of every car where asked for
+    """
+
+    out: Path | None
+    steps: Path | None
+    page: Path | None
+    save: Path | None
+    fronts: bool
+    effects: bool
+    _collector: "Collector | None" = field(default=None, init=False)
+    _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
+
+    def check(self, job: Job) -> None:
+        """DataError, before anything is solved, where a file cannot be written, is an input, or is named twice."""
+        self._check_tables(job)
+        if self.page is None and self.save is None:
+            if self.fronts or self.effects:
+                raise DataError(
+                    "--fronts and --sensitivity add to the page; name it with --report or --save"
+                )
+            return
+        from hevopt.pages.collect import Collector, check_steps
+
+        check_steps(job.trace)
+        sources = [str(car.source) for car in job.cars.cars]
+        check_files(self.page, self.save, sources, str(job.trace.source))
+        self._collector = Collector()
+
+    def _check_tables(self, job: Job) -> None:
+        from hevopt.outputs import check_table_file
+        from hevopt.writing import check_writable
+
+        taken = {Path(name).resolve(): "an input" for name in job.about["inputs"]}
+        for option, path in (("--report", self.page), ("--save", self.save)):
+            if path is not None:
+                taken[path.resolve()] = f"the file of {option} as well"
+        for option, path in (("--out", self.out), ("--out-steps", self.steps)):
+            if path is not None:
+                target = check_writable(path)
+                if target in taken:
+                    raise DataError(f"{option} {path} is {taken[target]}; choose another")
+                check_table_file(path)
+                taken[target] = f"the file of {option} as well"
+
+    def observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
+        """Take what the files need of a solved case."""
+        if self._collector is not None:
+            self._collector.observe(case, row, plan, trajectory)
+        if self.steps is not None:
+            from hevopt.outputs import step_columns
+
+            self._driven.append((row, step_columns(case.cycle, case.problem, trajectory)))
+
+    def write(self, job: Job, comparison: "Comparison") -> list[str]:
+        """Write all of them; a line for each."""
+        from hevopt import outputs
+
+        lines = self._write_page(job, comparison)
+        if self.out is not None:
+            outputs.write_rows(self.out, comparison, job.about)
+            lines.append(f"rows written to {self.out}")
+        if self.steps is not None:
+            outputs.write_steps(self.steps, comparison, outputs.joined(self._driven), job.about)
+            lines.append(f"steps written to {self.steps}")
+        return lines
+
+    def _write_page(self, job: Job, comparison: "Comparison") -> list[str]:
+        if self._collector is None:
+            return []
+        from hevopt.commands.studies import with_studies
+
+        results = self._collector.results(
+            comparison,
+            command_line(),
+            changes=job.changed(),
+            others=[job.settings.file] if job.settings.file is not None else [],
+            published=not any(job.cars.changes.values()),
+        )
+        results = with_studies(
+            results, job.cars, job.trace, job.settings, fronts=self.fronts, effects=self.effects
+        )
+        return write_files(results, self.page, self.save)
+
+
+def show_comparison(job: Job, comparison: "Comparison", lines: list[str], *, json: bool) -> None:
+    """Print the rows as a table with notes, published figures and some last lines, or all as JSON."""
+    from hevopt import outputs, report
+
+    if json:
+        write(outputs.result_json(comparison, job.about))
+        return
+    show(report.comparison_table(comparison))
+    write("\n".join([report.comparison_notes(comparison), *job.changed()]) + "\n")
+    # Published figures are those of the shipped cars.
+    published = None if any(job.cars.changes.values()) else report.published_table(comparison)
+    if published is not None:
+        show(published)
+    for line in lines:
+        write(line)
