@@ -105,7 +105,9 @@ def act(what):
             pass
         case "pids":
             time.sleep(0.1)
-            return {"pid": os.getpid(), "worker": os.getppid()}
+            blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+            deaf = signal.SIGINT in blocked
+            return {"pid": os.getpid(), "worker": os.getppid(), "deaf": deaf}
         case "threads":
             return _threads()
         case "raise":

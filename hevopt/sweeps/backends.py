@@ -14,13 +14,14 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
-from os import getpid
+from multiprocessing import resource_tracker
 from typing import Any
 
 from joblib import Parallel, delayed
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
 from joblib.parallel import ParallelBackendBase
 
-from hevopt.errors import HevoptError, SolverError
+from hevopt.errors import HevoptError
 from hevopt.sweeps.child import Terms
 from hevopt.sweeps.jobs import Job, Outcome
 from hevopt.sweeps.pools import Pool, open_pool
@@ -30,7 +31,7 @@ _TASK_S = 1.0
 _TICK_S = 0.2
 _CLOSE_S = 15.0
 # Pools that may end one after the other without a single outcome in between.
-_LOSSES_MAX = 3
+_LOSSES_MAX = 5
 
 Run = Callable[[Iterable[Job]], Iterator[list[Outcome]]]
 
@@ -48,10 +49,21 @@ def workers(
 
     The outcomes come in lists, an empty one five times a second where there is none, so that the caller can see to
     other things; closed early, the jobs on their way are given up. Pools that break are opened anew, and what was
-    on its way is run again; `notice` is told. Raises SolverError where they break time after time.
+    on its way is run again; `notice` is told. Raises WorkersLost where they break time after time.
     """
     with _Team(partial(open_pool, backend, count, scheduler), terms, notice) as team:
         yield team.run
+
+
+class WorkersLost(HevoptError):
+    """Workers end faster than they work; what they had done is stored."""
+
+    exit_status = 4
+
+    def __init__(self, text: str) -> None:
+        super().__init__(
+            f"{text}; all results so far are stored: the same command goes on from there"
+        )
 
 
 class _Futures(ParallelBackendBase):
@@ -198,7 +210,7 @@ class _Team:
     def _drive(self, tasks: _Tasks, deliver: Callable[[Any], None]) -> None:
         """Runs tasks through joblib until none is left or one is lost; the last thing delivered is None."""
         try:
-            call = delayed(partial(_numbered, self._terms, getpid()))
+            call = delayed(partial(_numbered, self._terms))
             parallel = Parallel(
                 backend=self._backend, n_jobs=self._backend.pool.workers, batch_size=1,
                 pre_dispatch=self._backend.pool.window, return_as="generator_unordered",
@@ -236,26 +248,34 @@ class _Team:
         text = (str(fault).splitlines() or [""])[0] or type(fault).__name__
         self._losses += 1
         if self._losses > _LOSSES_MAX:
-            raise SolverError(
+            raise WorkersLost(
                 f"workers ended {self._losses} times without an outcome in between, last: {text}"
-            ) from None
+            )
         tasks.take_back()
         self._notice(f"a worker was lost ({text}); its jobs are run again")
         self._close()
-        self._renew()
+        try:
+            self._renew()
+        except HevoptError as error:
+            raise WorkersLost(
+                f"a worker was lost ({text}), and no other could be started: {error}"
+            ) from None
 
 
 def _numbered(
-    terms: Terms, parent: int, number: int, jobs: list[Job]
+    terms: Terms, number: int, jobs: list[Job]
 ) -> tuple[int, list[Outcome] | HevoptError]:
     """What a worker returns; an error as a value, since each backend dresses up what is raised in its own way."""
     try:
-        return number, run_task(jobs, terms, parent)
+        return number, run_task(jobs, terms)
     except HevoptError as error:
         return number, error
 
 
 def _keep_interrupts() -> None:
+    # Each of the two unblocks interrupts in the thread that first needs it: so they are started before.
+    resource_tracker.ensure_running()
+    loky_tracker.ensure_running()
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from hevopt.errors import DataError
 from hevopt.files import shown
-from hevopt.sweeps.supervisor import ONE_THREAD
+from hevopt.sweeps.supervisor import ONE_THREAD, end_with
 
 BACKENDS = ("loky", "dask", "ray")
 _CONNECT_S = 20.0
@@ -68,7 +68,9 @@ def _loky(workers: int | None, _: str | None) -> Pool:
     from joblib.externals.loky import ProcessPoolExecutor
 
     count = workers or cores()
-    executor = ProcessPoolExecutor(count, env=ONE_THREAD)
+    executor = ProcessPoolExecutor(
+        count, env=ONE_THREAD, initializer=end_with, initargs=(os.getpid(),)
+    )
     # Workers hold nothing but a process that solves; ended at once, they take it along.
     return Pool(executor.submit, count, 2 * count, lambda: executor.shutdown(kill_workers=True))
 

@@ -40,9 +40,8 @@ class Ended(NamedTuple):
     late: bool
 
 
-def run_task(jobs: Sequence[Job], terms: Terms, parent: int) -> list[Outcome]:
-    """The outcomes of all cases of some jobs. parent: who sent them; where that started this worker, both end."""
-    _end_with(parent)
+def run_task(jobs: Sequence[Job], terms: Terms) -> list[Outcome]:
+    """The outcomes of all cases of some jobs."""
     return [outcome for job in jobs for outcome in _outcomes(job, terms)]
 
 
@@ -176,15 +175,9 @@ def _end(running: subprocess.Popen, pipe: Connection, errors: IO[bytes]) -> None
     errors.close()
 
 
-_watching = False
-
-
-def _end_with(parent: int) -> None:
-    """Let this worker end when the process that sent its tasks does, if that is the one that started it."""
-    global _watching
-    if not _watching and os.getppid() == parent:
-        _watching = True
-        threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+def end_with(parent: int) -> None:
+    """Let this worker end when the process that started it does, be that before its first task."""
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
 def _watch(parent: int) -> None:

@@ -164,15 +164,11 @@ def test_a_cluster_that_does_not_answer_is_told(swept, monkeypatch, capsys, tmp_
     assert status == 2 and "no Dask cluster at 'tcp://127.0.0.1:9'" in err
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_asked_to_end_it_stores_all_it_has_and_leaves_no_process(tmp_path, name):
+def test_asked_to_end_by_a_cluster_it_stores_all_it_has_and_leaves_no_process(tmp_path):
     study, store = write_study(tmp_path, 33, 40), tmp_path / "study.sqlite"
     process = start(study, "--jobs", "2")
     wait_for_results(process, store, 1)
-    if name == "SIGINT":
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    else:
-        process.send_signal(signal.SIGTERM)
+    process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 4, err
     assert "the same command goes on from there" in out and "Traceback" not in err
