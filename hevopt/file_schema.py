@@ -7,17 +7,15 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from hevopt.architecture_files import (
-    ArchitectureFile,
-    BatteryFile,
-    CarFile,
-    EngineFile,
-    GearboxFile,
-    MachineFile,
-)
+from hevopt.architecture_file import ArchitectureFile
+from hevopt.battery_file import BatteryFile
+from hevopt.car_file import CarFile
 from hevopt.datafile import FileModel
+from hevopt.engine_file import EngineFile
 from hevopt.errors import unknown_name
+from hevopt.gearbox_file import GearboxFile
 from hevopt.key_meanings import MEANINGS
+from hevopt.machine_file import MachineFile
 
 # A component in an architecture: its file, or its file and keys in place of the file's.
 _NAMED = {

@@ -1,6 +1,6 @@
 """What every key of architecture and component files means, and its unit; "" where it has none.
 
-Model of architecture_files.py -> key -> (unit, meaning). A test keeps it complete.
+Model of a file or table -> key -> (unit, meaning). A test keeps it complete.
 """
 
 _NAME = ("", "name shown in tables and messages")

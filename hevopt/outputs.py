@@ -19,7 +19,8 @@ from hevopt.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.files import printable
 from hevopt.problem import Problem, Trajectory
-from hevopt.study import Comparison, Row
+from hevopt.rows import Row
+from hevopt.study import Comparison
 from hevopt.writing import check_writable, write_whole
 
 SUFFIXES = (".csv", ".parquet", ".json")

@@ -12,8 +12,9 @@ from rich.text import Text
 
 from hevopt.problem import Plan, Problem
 from hevopt.published import published_beside
+from hevopt.rows import Row
 from hevopt.strategies import STRATEGIES
-from hevopt.study import Comparison, Row
+from hevopt.study import Comparison
 from hevopt.writing import write_whole
 
 _CAUSAL_MARK = "†"

@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.architecture import load_architecture
+from hevopt.case import prepare
 from hevopt.cycle import Cycle, load_cycle
 from hevopt.datafile import read_contents
 from hevopt.errors import HevoptError
 from hevopt.files import find
+from hevopt.rows import Row
 from hevopt.strategies import fitting, strategy_named
-from hevopt.study import Row, prepare, run_case
+from hevopt.study import run_case
 
 SHARE = 0.1
 # The optimum, and the rule that drives the car: the first that fits.

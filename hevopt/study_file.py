@@ -23,9 +23,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from hevopt.architecture import COMPONENTS, Architecture, load_architecture
-from hevopt.architecture_files import AuxiliaryPower, Mass, ShiftFuel, Soc, StartFuel
 from hevopt.datafile import FileModel, checked, read_contents
 from hevopt.errors import DataError
+from hevopt.file_fields import AuxiliaryPower, Mass, ShiftFuel, Soc, StartFuel
 from hevopt.files import is_path, printable, shipped_names, shown
 
 NEUTRAL = "neutral"

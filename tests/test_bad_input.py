@@ -351,7 +351,7 @@ def test_an_engine_without_fuel_has_no_percentages(hevopt):
 
 def test_a_figure_that_is_not_finite_is_a_failed_case(hevopt, monkeypatch):
     Path("c.csv").write_text(CYCLE)
-    monkeypatch.setattr("hevopt.study.litres_per_100km", lambda *_: float("inf"))
+    monkeypatch.setattr("hevopt.rows.litres_per_100km", lambda *_: float("inf"))
     seen = hevopt(
         "compare", "--architectures", "B", "--strategies", "dp", "--cycle", "c.csv", "--json"
     )

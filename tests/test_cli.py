@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from hevopt.cli import main
-from hevopt.study import Row
+from hevopt.rows import Row
 
 KEYS = """architecture, strategy, status, fuel_l_per_100km, delta_fuel_percent, co2_g_per_km, nox_mg_per_km,
 delta_nox_percent, soc_start, soc_end, delta_energy_percent, fuel_corrected_l_per_100km, engine_starts,

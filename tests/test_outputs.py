@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from test_cli import call
 
 from hevopt import DataError, build_problem, load_architecture, load_cycle, outputs, simulate, solve
-from hevopt.study import Comparison, Row
+from hevopt.rows import Row
+from hevopt.study import Comparison
 
 SHORT = "time_s,speed_kmh\n0,0\n5,0\n15,40\n40,40\n50,0\n60,0\n70,50\n110,50\n125,0\n130,0\n"
 ABOUT = {"inputs": {"a.toml": "0f"}, "versions": {"hevopt": "0"}, "settings": {"nox_weight": 0.0}}

@@ -3,8 +3,8 @@
 import pytest
 
 from hevopt import load_architecture, load_cycle, simulate
+from hevopt.case import prepare
 from hevopt.strategies import STRATEGIES, fitting
-from hevopt.study import prepare
 
 
 def cost_and_bound(case):

@@ -8,9 +8,10 @@ import pytest
 from test_cli import call
 
 from hevopt import InfeasibleError, load_architecture, load_cycle
-from hevopt.pages.results import load_results
+from hevopt.case import prepare
+from hevopt.pages.saved import load_results
 from hevopt.sensitivity import sensitivities
-from hevopt.study import prepare, run_case
+from hevopt.study import run_case
 
 
 @cache

@@ -8,6 +8,7 @@ import pytest
 from test_cli import call
 
 from hevopt import DataError, load_architecture, load_cycle, study
+from hevopt.case import prepare
 from hevopt.commands.options import SETTINGS
 from hevopt.study_file import (
     KEYS,
@@ -98,7 +99,7 @@ def test_an_asked_end_charge_is_reached_and_neutral_takes_it_back(hevopt, tmp_pa
 def test_every_strategy_knows_the_asked_end_charge(monkeypatch, soc_end):
     monkeypatch.setattr(study, "shipped_names", lambda kind, suffix: ["udds"])
     car = load_architecture("C2", {"battery.soc.end": soc_end})
-    case = study.prepare(car, load_cycle("hwfet"))
+    case = prepare(car, load_cycle("hwfet"))
     missed = []
     for name in STRATEGIES:
         row, _, trajectory = study.run_case(case, name)

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from test_cli import call
 
 from hevopt import DataError, load_cycle
-from hevopt.architecture_files import EngineFile, GearboxFile
 from hevopt.cycle import cycle_of, faults_in
 from hevopt.datafile import faults_of, read_contents
+from hevopt.engine_file import EngineFile
 from hevopt.files import shipped_folder
+from hevopt.gearbox_file import GearboxFile
 from hevopt.validation import validate
 
 SHIPPED = shipped_folder("architectures")

@@ -10,10 +10,12 @@ from hevopt.commands.terminal import show, write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
+    from hevopt.case import Case
     from hevopt.cycle import Cycle
     from hevopt.pages.collect import Collector
     from hevopt.problem import Plan, Trajectory
-    from hevopt.study import Case, Comparison, Row
+    from hevopt.rows import Row
+    from hevopt.study import Comparison
     from hevopt.study_file import Cars, Settings
 
 _SHARED = {"nox_weight": 0.0, "allow_shortfall": False, "free_gear": False, "refine": False}

@@ -45,7 +45,7 @@ def _page(file: Path) -> str:
 
         return sweep_page(load_sweep(file))
     from hevopt.pages.comparison import comparison_page
-    from hevopt.pages.results import load_results
+    from hevopt.pages.saved import load_results
 
     return comparison_page(load_results(file))
 

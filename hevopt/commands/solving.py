@@ -121,6 +121,7 @@ def run(
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
     from hevopt import outputs, report, study
+    from hevopt.case import prepare
     from hevopt.commands.comparing import Job
     from hevopt.cycle import load_cycle
     from hevopt.strategies import strategy_named
@@ -138,7 +139,7 @@ def run(
     nox_weight = settings.get("nox_weight", 0.0)
     with Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
-        case = study.prepare(
+        case = prepare(
             car,
             trace,
             nox_weight=nox_weight,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hevopt.architecture_files import CarFile
+from hevopt.car_file import CarFile
 from hevopt.datafile import checked, read_toml
 from hevopt.errors import DataError
 from hevopt.files import find

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from hevopt.architecture_files import EngineFile
+from hevopt.engine_file import EngineFile
 from hevopt.imports.coastdown import RoadLoad, Run
 from hevopt.imports.map_import import Imported
 from hevopt.imports.map_report import envelope_of

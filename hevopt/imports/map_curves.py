@@ -10,7 +10,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.architecture_files import EngineFile
+from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.imports.map_grid import Axes, Grid, Lines, envelope_nm, on_axes, torque_axis
 from hevopt.imports.map_import import Request

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from hevopt.architecture_files import EngineFile
 from hevopt.datafile import checked
+from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.imports.map_curves import check_idle, flow_grid, full_load, motoring_curve, on_speeds
 from hevopt.imports.map_grid import Lines, axes_of, in_lines

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.architecture_files import EngineFile, MachineFile
 from hevopt.datafile import Model, read_toml
+from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.files import find
 from hevopt.imports.map_grid import Grid, Lines
 from hevopt.imports.map_tables import Source
 from hevopt.keypaths import with_changes
+from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from hevopt.architecture_files import MachineFile
 from hevopt.datafile import checked
 from hevopt.errors import DataError
 from hevopt.imports.map_grid import Grid, axes_of, in_lines, on_axes
@@ -20,6 +19,7 @@ from hevopt.imports.map_import import (
     with_given,
 )
 from hevopt.imports.map_points import EngineFacts, read_points
+from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
 

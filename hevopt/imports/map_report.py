@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.architecture_files import EngineFile, MachineFile
+from hevopt.engine_file import EngineFile
 from hevopt.imports.map_grid import Grid, Lines
 from hevopt.imports.map_import import Imported
+from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.architecture import Architecture
+from hevopt.case import Case
 from hevopt.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.files import printable, shipped_folder
@@ -34,10 +35,10 @@ from hevopt.pages.results import (
 from hevopt.problem import Plan, Trajectory
 from hevopt.provenance import files_digests, versions
 from hevopt.published import published_beside
+from hevopt.rows import Row as StudyRow
 from hevopt.simulation import simulate
 from hevopt.strategies import STRATEGIES
-from hevopt.study import Case, Comparison
-from hevopt.study import Row as StudyRow
+from hevopt.study import Comparison
 from hevopt.units import litres_per_100km
 
 # Decimals of traces: finer than any of them is known.

@@ -6,7 +6,8 @@ from hevopt.published import CYCLE, HYBRIDS, STATEMENTS, WHEEL_WORK_MJPKM, perce
 from hevopt.reproduction import sections
 from hevopt.reproduction.cases import JOINT, Reproduction, Under, least_penalty
 from hevopt.reproduction.verdicts import markdown, off_text, points_off, signed, standing, star
-from hevopt.study import NEUTRAL_PERCENT, Comparison
+from hevopt.rows import NEUTRAL_PERCENT
+from hevopt.study import Comparison
 
 COMMAND = "hevopt reproduction --out reports/reproduction.md"
 _MEAN_NOX = STATEMENTS[4]

@@ -5,10 +5,11 @@ A job is one car on one cycle: its control table is built once for all strategie
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
-from hevopt.architecture import load_architecture
-from hevopt.cycle import load_cycle
+from hevopt.architecture import Architecture, load_architecture
+from hevopt.cycle import Cycle, load_cycle
 from hevopt.provenance import cycle_contents, digest, physics_digest, versions
 
 NOX_WEIGHT = "nox_weight"
@@ -26,20 +27,24 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A car, as an architecture with changed keys, on a cycle, and the cases to solve on it."""
+    """A car, as an architecture with changed keys, on a cycle, and the cases to solve on it.
+
+    inputs: digest of what the files held when the keys were made; None for whatever they hold
+    """
 
     architecture: str
     changes: Mapping[str, Any]
     cycle: str
     allow_shortfall: bool
     cases: tuple[Case, ...]
+    inputs: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What came of a case. status: "ok", "infeasible" (proven or found impossible) or "failed", with the error.
 
-    row: the fields of study.Row but solve_s, and `objective_l_per_100km`: charge-corrected fuel + weighted NOx
+    row: the fields of rows.Row but solve_s, and `objective_l_per_100km`: charge-corrected fuel + weighted NOx
     seconds: time it took, the table and the dynamic program going to the first case that needed them
     """
 
@@ -60,6 +65,16 @@ class Planned(NamedTuple):
     key: str
 
 
+def inputs_digest(car: Architecture, cycle: Cycle) -> str:
+    """SHA-256 of everything in the files of a car and a cycle that a result depends on."""
+    return digest([car.contents, _cycle_digest(cycle)])
+
+
+@lru_cache(maxsize=64)
+def _cycle_digest(cycle: Cycle) -> str:
+    return digest(cycle_contents(cycle))
+
+
 def jobs_of(
     architecture: str,
     cycles: Sequence[str],
@@ -74,18 +89,20 @@ def jobs_of(
     cases. Raises DataError where a changed key is not allowed, before the job is handed out.
     """
     common = {"code": physics_digest(), "versions": versions(), "allow_shortfall": allow_shortfall}
-    traces = {cycle: digest(cycle_contents(load_cycle(cycle))) for cycle in cycles}
+    traces = {cycle: load_cycle(cycle) for cycle in cycles}
     for changes, members in groups:
-        car = digest(load_architecture(architecture, changes).contents)
+        car = load_architecture(architecture, changes)
         for cycle in cycles:
-            inputs = digest({**common, "car": car, "cycle": traces[cycle]})
+            inputs = inputs_digest(car, traces[cycle])
+            made_of = digest({**common, "inputs": inputs})
             cases: dict[tuple[float, str], Case] = {}
             planned = []
             for design, given in members:
                 weight = float(given)
                 for strategy in strategies:
-                    key = digest([inputs, weight, strategy])
+                    key = digest([made_of, weight, strategy])
                     cases[weight, strategy] = Case(key, weight, strategy)
                     planned.append(Planned(design, cycle, strategy, weight, key))
-            job = Job(architecture, changes, cycle, allow_shortfall, tuple(cases.values()))
+            solved = tuple(cases.values())
+            job = Job(architecture, changes, cycle, allow_shortfall, solved, inputs)
             yield job, planned

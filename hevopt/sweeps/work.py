@@ -9,16 +9,18 @@ from time import perf_counter
 from typing import Any
 
 from hevopt.architecture import Architecture, load_architecture
+from hevopt.case import Case as SolvedCase
+from hevopt.case import dp_case
 from hevopt.certificate import SCOPE, Certificate
 from hevopt.cycle import Cycle, load_cycle
-from hevopt.errors import HevoptError, InfeasibleError, SolverError
+from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
 from hevopt.files import find
 from hevopt.powertrain import build_problem
 from hevopt.prices import one_price_dual
 from hevopt.problem import Problem
-from hevopt.study import Case as SolvedCase
-from hevopt.study import Row, dp_case, run_case
-from hevopt.sweeps.jobs import BOUND, Case, Job, Outcome
+from hevopt.rows import Row
+from hevopt.study import run_case
+from hevopt.sweeps.jobs import BOUND, Case, Job, Outcome, inputs_digest
 from hevopt.units import litres_per_100km
 
 _ONE_MULTIPLIER = "one multiplier"
@@ -66,6 +68,10 @@ class _Bench:
                 load_architecture(self.job.architecture, self.job.changes),
                 _cycle(self.job.cycle),
             )
+            if self.job.inputs not in (None, inputs_digest(car, cycle)):
+                raise DataError(
+                    "the files of this case changed after the sweep began; run the same command again"
+                )
             problem = build_problem(car, cycle, allow_shortfall=self.job.allow_shortfall)
             self._built = car, cycle, problem
         car, cycle, problem = self._built

@@ -7,7 +7,7 @@ import pytest
 
 from hevopt.errors import DataError
 from hevopt.pages.comparison import comparison_page
-from hevopt.pages.results import load_results
+from hevopt.pages.saved import load_results
 
 
 def test_saved_results_come_back_and_make_the_same_page(nedc, tmp_path):

@@ -22,7 +22,7 @@ from hevopt.pages.sweep_drawing import plane_of
 from hevopt.pages.sweep_effects import effect
 from hevopt.pages.sweep_front import boundary, lines_boundary, pareto
 from hevopt.pages.sweep_verdict import alerts, groups_of, verdict
-from hevopt.study import Row
+from hevopt.rows import Row
 from hevopt.sweeps.export import export
 from hevopt.sweeps.jobs import Outcome, Planned
 from hevopt.sweeps.prune import Pruned

@@ -3,8 +3,10 @@
 import pytest
 
 from hevopt import load_architecture, load_cycle
+from hevopt.case import prepare
 from hevopt.errors import SolverError
-from hevopt.study import Row, prepare, run_case
+from hevopt.rows import Row
+from hevopt.study import run_case
 from hevopt.sweeps.jobs import Case, Job, jobs_of
 from hevopt.sweeps.work import run_job
 
@@ -76,3 +78,13 @@ def test_an_exception_is_an_outcome_and_the_other_cases_go_on():
     (outcome,) = run_job(weak)
     assert outcome.status == "infeasible" and "Nm missing" in outcome.error
     assert {o.status for o in run_job(impossible)} <= {"ok", "infeasible", "failed"}
+
+
+def test_a_file_that_changes_while_a_sweep_runs_fails_its_cases(tmp_path):
+    cycle = tmp_path / "drive.csv"
+    cycle.write_text("time_s,speed_kmh\n0,0\n10,36\n20,36\n30,0\n")
+    ((job, _),) = jobs_of("C2", [str(cycle)], ["dp"], [({}, [(0, 0.0)])])
+    assert run_job(job)[0].status == "ok"
+    cycle.write_text("time_s,speed_kmh\n0,0\n10,40\n20,36\n30,0\n")
+    (outcome,) = run_job(job)
+    assert outcome.status == "failed" and "changed after the sweep began" in outcome.error

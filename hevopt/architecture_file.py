@@ -1,0 +1,70 @@
+"""What an architecture's file may hold: the components it names, its functions and the coupling."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, model_validator
+
+from hevopt.datafile import FileModel
+from hevopt.file_fields import Description, Fraction, Name, Named, Ratio, Table
+
+Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
+CouplingKind = Literal[
+    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
+]
+
+
+def _names_a_file(table: dict[str, Any]) -> dict[str, Any]:
+    if not isinstance(table.get("file"), str):
+        raise ValueError('a table needs file = "name"; its other keys replace those of that file')
+    return table
+
+
+# A component: the name or path of its file, or a table {file, ...} whose other keys replace the file's.
+Component = Annotated[
+    Annotated[str, Named] | Annotated[dict[str, Any], AfterValidator(_names_a_file), Table],
+    Discriminator(lambda value: "a table" if isinstance(value, dict) else "a name"),
+]
+
+
+class CouplingFile(FileModel):
+    """How the machine joins the shafts."""
+
+    kind: CouplingKind
+    second_clutch: bool | None = None
+    machine_ratio: Ratio | None = None
+    machine_efficiency: Fraction | None = None
+    disconnects_above_speed_max: bool = False
+    machine_shift_fuel_g: Annotated[float, Field(ge=0, le=10)] = 0.0
+
+    @model_validator(mode="after")
+    def _keys_of_kind(self):
+        needed = {
+            "gearbox_input": {"second_clutch"},
+            "gearbox_output": {"machine_ratio", "machine_efficiency"},
+        }.get(self.kind, set())
+        allowed = {
+            "gearbox_output": needed | {"disconnects_above_speed_max"},
+            "even_shaft": {"machine_shift_fuel_g"},
+        }.get(self.kind, needed)
+        given = self.model_fields_set - {"kind"}
+        if missing := needed - given:
+            raise ValueError(f"kind {self.kind!r} needs {', '.join(sorted(missing))}")
+        if extra := given - allowed:
+            raise ValueError(f"kind {self.kind!r} does not use {', '.join(sorted(extra))}")
+        return self
+
+
+class ArchitectureFile(FileModel):
+    """An architecture: its components, functions (Table 1) and coupling."""
+
+    name: Name
+    description: Description = ""
+    car: Component
+    engine: Component
+    gearbox: Component
+    machine: Component
+    battery: Component
+    hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
+    functions: list[Function]
+    gear: Literal["cycle", "free"] = "cycle"
+    coupling: CouplingFile

@@ -1,0 +1,45 @@
+"""What a car's file may hold: mass, wheels, auxiliaries and road load."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from hevopt.datafile import FileModel
+from hevopt.file_fields import AuxiliaryPower, Coefficient, Mass, Name
+
+
+class RoadLoadFile(FileModel):
+    """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12)."""
+
+    rolling_c0: Annotated[float, Field(ge=0, le=0.2)] | None = None
+    rolling_c1_spm: Coefficient = 0.0
+    rolling_c2_s2pm2: Coefficient = 0.0
+    rolling_c3_s3pm3: Coefficient = 0.0
+    drag_area_m2: Annotated[float, Field(ge=0, le=20)] | None = None
+    air_density_kgpm3: Annotated[float, Field(ge=0.01, le=2)] = 1.2
+    coastdown_c0_n: Annotated[float, Field(ge=0, le=1e6)] | None = None
+    coastdown_c1_nspm: Coefficient = 0.0
+    coastdown_c2_ns2pm2: Coefficient = 0.0
+
+    @model_validator(mode="after")
+    def _one_form(self):
+        coastdown = {key for key in self.model_fields_set if key.startswith("coastdown")}
+        parts = self.model_fields_set - coastdown
+        whole = {"rolling_c0", "drag_area_m2"} <= parts or "coastdown_c0_n" in coastdown
+        if not whole or (coastdown and parts):
+            raise ValueError(
+                "give either rolling_c0 and drag_area_m2, or coastdown_c0_n, and no key of the other "
+                f"form; found: {', '.join(sorted(self.model_fields_set)) or 'none'}"
+            )
+        return self
+
+
+class CarFile(FileModel):
+    """A car without powertrain."""
+
+    name: Name
+    mass_kg: Mass
+    tyre_radius_m: Annotated[float, Field(ge=0.1, le=1.5)]
+    wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
+    auxiliary_power_w: AuxiliaryPower
+    road_load: RoadLoadFile

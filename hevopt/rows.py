@@ -1,0 +1,141 @@
+"""Rows: the figures of one architecture and strategy, made of a case and a trajectory, and their reference."""
+
+from dataclasses import dataclass, fields
+
+from hevopt.architecture import Architecture
+from hevopt.case import Case
+from hevopt.certificate import SCOPE
+from hevopt.errors import HevoptError
+from hevopt.problem import Problem, Trajectory
+from hevopt.units import litres_per_100km
+
+NEUTRAL_PERCENT = 1.0
+REFERENCE_ARCHITECTURE = "A"
+# A percentage of less than this is none: the figure it would stand beside is rounding.
+_TINY = 1e-9
+_ROUNDING_J = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
+    no reference, no fuel, or a bound of 0.
+
+    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy; "end charge missed" where
+    another end charge than the start's is asked), "shortfall" (steps driven with less than the cycle asks), joined
+    by commas, or "failed: ..." with the reason
+    delta_energy_percent: stored energy at the end above what is asked, as a share of the fuel's;
+    fuel_corrected_l_per_100km: fuel less what that energy is worth
+    bound_l_per_100km: least of fuel + weighted NOx that any plan with this row's end charge could reach,
+    as fuel volume; gap_percent: this row's own sum above it
+    """
+
+    architecture: str
+    strategy: str
+    status: str
+    fuel_l_per_100km: float | None = None
+    delta_fuel_percent: float | None = None
+    co2_g_per_km: float | None = None
+    nox_mg_per_km: float | None = None
+    delta_nox_percent: float | None = None
+    soc_start: float | None = None
+    soc_end: float | None = None
+    delta_energy_percent: float | None = None
+    fuel_corrected_l_per_100km: float | None = None
+    engine_starts: int | None = None
+    bound_l_per_100km: float | None = None
+    gap_percent: float | None = None
+    certificate: str | None = None
+    solve_s: float | None = None
+
+    def as_dict(self) -> dict:
+        """All fields by name, in order."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
+    """The row of what a strategy does on a case, no reference yet."""
+    car, cycle, problem, certificate = case.car, case.cycle, case.problem, case.certificate
+    fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
+    surplus_j = trajectory.end_j - problem.end_min_j
+    fuel_j = fuel_kg * car.engine.heating_value_jpkg
+    bound_kg, proof = certificate.bound_kg(trajectory.end_j)
+
+    def litres(mass_kg: float) -> float:
+        return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
+
+    return Row(
+        architecture=car.name,
+        strategy=strategy,
+        status=_status(problem, surplus_j, fuel_j),
+        fuel_l_per_100km=litres(fuel_kg),
+        co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
+        nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km,
+        soc_start=float(trajectory.soc[0]),
+        soc_end=float(trajectory.soc[-1]),
+        delta_energy_percent=_percent(surplus_j, fuel_j),
+        fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * surplus_j),
+        engine_starts=engine_starts(problem, trajectory),
+        bound_l_per_100km=litres(bound_kg),
+        gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
+        certificate=f"{proof}, {SCOPE}",
+        solve_s=solve_s,
+    )
+
+
+def failed_row(car: Architecture, strategy: str, error: HevoptError) -> Row:
+    """The row of a strategy that has no figures."""
+    return Row(car.name, strategy, f"failed: {str(error).splitlines()[0].rstrip(':')}")
+
+
+def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
+    """Rows with their change against the first good row of architecture A, or else of the table."""
+    good = [row for row in rows if row.fuel_l_per_100km is not None]
+    named = [row for row in good if row.architecture == REFERENCE_ARCHITECTURE]
+    if not good:
+        return rows, None
+    base = (named or good)[0]
+
+    def change(value: float | None, reference: float | None) -> float | None:
+        if value is None or reference is None or reference < _TINY:
+            return None
+        return 100 * (value / reference - 1)
+
+    changed = [
+        Row(
+            **row.as_dict()
+            | {
+                "delta_fuel_percent": change(row.fuel_l_per_100km, base.fuel_l_per_100km),
+                "delta_nox_percent": change(row.nox_mg_per_km, base.nox_mg_per_km),
+            }
+        )
+        for row in rows
+    ]
+    return changed, f"{base.architecture} {base.strategy}"
+
+
+def _status(problem: Problem, surplus_j: float, fuel_j: float) -> str:
+    marks = []
+    if 100 * abs(surplus_j) > max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J):
+        neutral = problem.end_min_j == problem.start_j
+        marks.append("not neutral" if neutral else "end charge missed")
+    missing = problem.table.missing_torque_nm
+    if missing is not None and (missing > 0).any():
+        count = int((missing > 0).sum())
+        marks.append(f"shortfall at {count} step{'s' if count > 1 else ''}")
+    return ", ".join(marks) or "ok"
+
+
+def engine_starts(problem: Problem, trajectory: Trajectory) -> int:
+    """How often the engine goes from rest to turning."""
+    on = [problem.table.controls[c].engine_on for c in trajectory.control]
+    start_on = any(
+        control.engine_on
+        for control, mode in zip(problem.table.controls, problem.table.mode, strict=True)
+        if mode == problem.start_mode
+    )
+    return sum(now and not before for before, now in zip([start_on, *on], on, strict=False))
+
+
+def _percent(part: float, whole: float) -> float | None:
+    return 100 * part / whole if whole > _TINY else None
