@@ -240,7 +240,8 @@ def _end(store: Path, done: "Progress | None", export: Path | None) -> None:
         write(f"stopped; all results there are lie in {store}; the same command goes on from there")
         raise typer.Exit(_PARTLY)
     write(
-        f"results in {store}; tables: hevopt sweep --store {store} --export FILE.csv; page: hevopt report {store} --out PAGE.html"
+        f"results in {store}\n  as a table: hevopt sweep --store {store} --export FILE.csv\n"
+        f"  as a page:  hevopt report {store} --out PAGE.html"
     )
     if counts["failed"]:
         write("--retry-failed runs failed cases once more")

@@ -62,7 +62,7 @@ def mean_objective(objectives: Sequence[Sequence[float | None]]) -> float | None
 def search(designs: Iterable[Bounded], wave: int = WAVE) -> Search:
     """Yields waves; each expects, sent back, design -> objective of the wave's designs, None where it failed.
 
-    A design without a bound, because it failed or is infeasible, is solved all the same: its error is then on record.
+    A design without a bound, because it failed or is infeasible, is solved all the same: its error is on record.
     """
     groups: dict[float, _Group] = {}
     for given in sorted(designs, key=_order):
