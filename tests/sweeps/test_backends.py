@@ -46,7 +46,10 @@ def ended(pids, within_s=5.0):
     return not any(map(alive, pids))
 
 
-@pytest.mark.parametrize(("backend", "count"), [("loky", 2), ("loky", 1), ("dask", 2), ("ray", 2)])
+@pytest.mark.parametrize(
+    ("backend", "count"),
+    [("loky", 2), pytest.param("loky", 1, marks=pytest.mark.long), ("dask", 2), ("ray", 2)],
+)
 def test_a_backend_has_as_many_workers_as_asked_outside_this_process(backend, count, monkeypatch):
     # Ray's workers do not share this process' path.
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))

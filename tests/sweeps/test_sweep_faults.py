@@ -156,7 +156,7 @@ def small_files(folder):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize("limit", [small_disk, small_files])
+@pytest.mark.parametrize("limit", [pytest.param(small_disk, marks=pytest.mark.long), small_files])
 def test_a_full_disk_stops_the_sweep_and_loses_nothing_stored(small_study, tmp_path, limit):
     folder = tmp_path / "disk"
     folder.mkdir()
@@ -196,6 +196,7 @@ def test_a_read_only_folder_is_refused_before_anything_runs(study, tmp_path, mon
     assert not stored(tmp_path / "s.sqlite")
 
 
+@pytest.mark.long
 def test_ctrl_c_pressed_again_and_again_loses_nothing(study, whole, tmp_path):
     store = tmp_path / "s.sqlite"
     process = start(study, "--jobs", "2", "--store", str(store))
