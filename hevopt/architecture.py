@@ -89,7 +89,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     a path that begins with a component goes into that component's file. Raises DataError as for the file itself.
     """
     path = find("architectures", name, ".toml")
-    own, of_parts = _sorted_changes(changes or {})
+    own, of_parts = sorted_changes(changes or {})
     contents = with_changes(read_contents(path), own)
     data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
@@ -130,7 +130,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     return car.with_free_gear() if data.gear == "free" else car
 
 
-def _sorted_changes(
+def sorted_changes(
     changes: Mapping[str, Any],
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """Changes of the architecture's own keys, and component -> changes in its file."""

@@ -111,8 +111,9 @@ def machine_torque_range(
     low = high = apart
     if joint.engine_on:
         transmits = joint.locked | joint.slipping
-        full = engine_model.full_load_torque_nm(architecture.engine, joint.engine_speed_radps)
         least = least_engine_torque(architecture, joint)
+        full = engine_model.covered_torque_nm(architecture.engine, joint.engine_speed_radps)
+        full = np.where(np.isnan(full), np.maximum(least, 0.0), full)
         low = np.where(transmits, machine_torque_at(architecture, demand, joint, full), apart)
         high = np.where(transmits, machine_torque_at(architecture, demand, joint, least), apart)
         alone = joint.upstream & ~transmits  # the engine drives the machine, nothing else
@@ -168,7 +169,7 @@ def balance(architecture: Architecture, demand: Demand, joint: Joint, machine_nm
 
 
 def deliverable_nm(architecture: Architecture, demand: Demand, joint: Joint) -> Array:
-    """(time,) largest wheel torque of the joint, engine at full load and machine at its limit."""
+    """(time,) largest wheel torque of the joint, machine at its limit, engine at full load or its map's end."""
     machine, speed = architecture.machine, joint.machine_speed_radps
     motoring = architecture.functions & {"e_boost", "nox_cut", "power_management"}
     usable = joint.connected & (speed <= machine.speed_max_radps) & bool(motoring)
@@ -178,9 +179,9 @@ def deliverable_nm(architecture: Architecture, demand: Demand, joint: Joint) -> 
             machine, architecture.vehicle.auxiliary_power_w, speed
         )
     net = top - machine.inertia_kgm2 * joint.machine_accel_radps2
-    full = engine_model.full_load_torque_nm(architecture.engine, joint.engine_speed_radps)
-    full = full - architecture.engine.inertia_kgm2 * joint.engine_accel_radps2
-    transmits = (joint.locked | joint.slipping) & joint.engine_on
+    covered = engine_model.covered_torque_nm(architecture.engine, joint.engine_speed_radps)
+    full = covered - architecture.engine.inertia_kgm2 * joint.engine_accel_radps2
+    transmits = (joint.locked | joint.slipping) & joint.engine_on & ~np.isnan(covered)
     transmits &= joint.engine_speed_radps <= architecture.engine.speed_max_radps
     joins = joint.shared | (joint.upstream & transmits)
     shaft = np.where(transmits, full, 0.0) + np.where(joins, net, 0.0)

@@ -9,7 +9,7 @@ from hevopt.file_fields import AuxiliaryPower, Coefficient, Mass, Name
 
 
 class RoadLoadFile(FileModel):
-    """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12)."""
+    """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12) with their mass."""
 
     rolling_c0: Annotated[float, Field(ge=0, le=0.2)] | None = None
     rolling_c1_spm: Coefficient = 0.0
@@ -20,6 +20,7 @@ class RoadLoadFile(FileModel):
     coastdown_c0_n: Annotated[float, Field(ge=0, le=1e6)] | None = None
     coastdown_c1_nspm: Coefficient = 0.0
     coastdown_c2_ns2pm2: Coefficient = 0.0
+    coastdown_mass_kg: Mass | None = None
 
     @model_validator(mode="after")
     def _one_form(self):

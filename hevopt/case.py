@@ -7,6 +7,8 @@ from hevopt.architecture import Architecture
 from hevopt.balance import Around
 from hevopt.certificate import TARGET_GAP, Certificate, certify
 from hevopt.cycle import Cycle
+from hevopt.errors import UnknownNoxError
+from hevopt.files import printable
 from hevopt.powertrain import TORQUE_LEVELS, build_problem, torques_of
 from hevopt.problem import Plan, Problem, Trajectory
 from hevopt.simulation import simulate
@@ -41,6 +43,7 @@ def prepare(
 ) -> Case:
     """The problem of a car on a cycle, solved by dynamic programming and certified.
 
+    Raises UnknownNoxError for a weight on NOx where the engine has no data on it.
     refine: add torque levels around the plan, closer each time, until its cost moves by less than 0.02 %; plans
     and certificate are then those of the table with the added levels.
     """
@@ -56,6 +59,8 @@ def prepare(
         )
         return dp_case(car, cycle, problem)
 
+    if nox_weight > 0:
+        require_nox(car, f"nox_weight {nox_weight:g}")
     case = case_with(None)
     share = 0.5 / (levels - 1)
     for _ in range(_REFINEMENTS_MAX if refine else 0):
@@ -68,6 +73,15 @@ def prepare(
             break
         share /= 2
     return case
+
+
+def require_nox(car: Architecture, asking: str) -> None:
+    """UnknownNoxError where the car's engine has no data on NOx; `asking` is how a message names what needs it."""
+    if not car.engine.nox_known:
+        raise UnknownNoxError(
+            f"{car.name}: {asking} needs NOx data, but engine {printable(car.engine.name)!r} has none; "
+            "add nox_gps to its fuel_map, or nox_coefficients, or leave NOx out"
+        )
 
 
 def dp_case(

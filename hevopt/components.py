@@ -32,6 +32,9 @@ def vehicle_of(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
     if load.coastdown_c0_n is not None:
         rolling = (0.0, 0.0, 0.0, 0.0)
         air = (load.coastdown_c0_n, load.coastdown_c1_nspm, load.coastdown_c2_ns2pm2, 0.0)
+        if load.coastdown_mass_kg is not None:  # C0 as rolling resistance, in proportion to weight
+            rolling = (load.coastdown_c0_n * mass_kg / load.coastdown_mass_kg, 0.0, 0.0, 0.0)
+            air = (0.0, *air[1:])
     else:
         weight_n = mass_kg * STANDARD_GRAVITY_MPS2
         polynomial = (
@@ -58,12 +61,11 @@ def engine_of(data: EngineFile) -> Engine:
     rpm, gram = TO_SI["_rpm"][1], TO_SI["_g"][1]
     if data.fuel_map is not None:
         grid = data.fuel_map
-        nox = grid.nox_gps or np.zeros((len(grid.speed_rpm), len(grid.torque_nm)))
         fuel = EngineGrid(
             np.array(grid.speed_rpm) * rpm,
             np.array(grid.torque_nm),
             np.array(grid.fuel_gps) * gram,
-            np.array(nox) * gram,
+            None if grid.nox_gps is None else np.array(grid.nox_gps) * gram,
             np.array(grid.motoring_torque_nm),
         )
     else:

@@ -6,6 +6,7 @@ Lines that begin with # are comments.
 """
 
 import csv
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,6 +32,9 @@ _STEP_MIN_S, _STEP_MAX_S = 1e-4, 3600.0
 _ACCELERATION_MAX_MPS2 = 20.0
 # Figures per distance say nothing below this.
 DISTANCE_MIN_M = 1.0
+# For a log or another tool's cycle given where one of our own is expected.
+_IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
+_OTHERS = (".xlsx", ".mat", ".vdri", ".tsv")
 # Called with every fault found: line and text.
 _Tell = Callable[[int, str], None]
 # Plainer than Python's own: no underscores, no digits of other scripts.
@@ -75,6 +79,8 @@ class Cycle:
 
 def load_cycle(name: str | Path) -> Cycle:
     """The cycle of a shipped name (`nedc`) or a CSV file's path; DataError names line and value."""
+    if Path(name).suffix.lower() in _OTHERS and os.path.exists(name):
+        raise DataError(f"{printable(str(name))}: not a cycle file, NAME.csv; {_IMPORT}")
     path = find("cycles", name, ".csv")
     return cycle_of(path, read_text(path, _MEGABYTES_MAX))
 
@@ -171,7 +177,7 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
         hint = f"close matches: {', '.join(close)}; " if close else ""
         raise DataError(
             f"{path}, line {number}: unknown column {shown(unknown[0])}; {hint}"
-            f"allowed: {', '.join(COLUMNS)}"
+            f"allowed: {', '.join(COLUMNS)}; {_IMPORT}"
         )
     if len(set(cells)) != len(cells):
         twice = next(cell for cell in cells if cells.count(cell) > 1)
@@ -180,7 +186,7 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
     if "time_s" not in cells or len(speeds) != 1:
         raise DataError(
             f"{path}, line {number}: found columns {', '.join(cells)}; needed: time_s and exactly "
-            f"one of {', '.join(_SPEED_COLUMNS)}"
+            f"one of {', '.join(_SPEED_COLUMNS)}; {_IMPORT}"
         )
     if "clutch_open" in cells and "gear" not in cells:
         raise DataError(f"{path}, line {number}: clutch_open without gear; add the column gear")

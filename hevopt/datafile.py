@@ -179,6 +179,11 @@ def _fault(model: type[BaseModel], fault: dict[str, Any]) -> str:
     if kind in _OUT_OF_RANGE:
         field = _model_and_field(model, location)[1]
         return f"{place} = {shown(found)}; allowed: {_range(field)}"
+    if kind == "literal_error" and isinstance(found, str):
+        names = re.findall(r"'([^']*)'", fault["ctx"]["expected"])
+        close = get_close_matches(found, names, n=2, cutoff=0.5)
+        hint = f"close matches: {', '.join(close)}; " if close else ""
+        return f"{place} = {shown(found)}: {hint}allowed: {fault['ctx']['expected']}"
     context = {"place": place, **fault.get("ctx", {})}
     needed = _NEEDED.get(kind, fault["msg"].replace("{", "{{").replace("}", "}}"))
     return f"{place} = {shown(found)}: {needed.format(**context)}"

@@ -12,7 +12,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.grid import interpolated
+from hevopt.grid import highest_known, interpolated
 
 Array = NDArray[np.float64]
 _PA_PER_BAR = 1e5
@@ -46,14 +46,14 @@ class NoxCoefficients:
 class EngineGrid:
     """A measured map; cells that were not measured are NaN.
 
-    speed_radps: (speed,), torque_nm: (torque,), fuel_kgps and nox_kgps: (speed, torque)
+    speed_radps: (speed,), torque_nm: (torque,), fuel_kgps and nox_kgps: (speed, torque); nox_kgps None: unknown
     motoring_torque_nm: (speed,) torque of the unfired engine, negative
     """
 
     speed_radps: Array
     torque_nm: Array
     fuel_kgps: Array
-    nox_kgps: Array
+    nox_kgps: Array | None
     motoring_torque_nm: Array
 
 
@@ -80,10 +80,28 @@ class Engine:
         """Highest speed of the full-load curve."""
         return float(self.full_load_speed_radps[-1])
 
+    @property
+    def nox_known(self) -> bool:
+        """Whether there are data on NOx."""
+        return (self.fuel.nox_kgps if isinstance(self.fuel, EngineGrid) else self.nox) is not None
+
 
 def full_load_torque_nm(engine: Engine, speed_radps: Array) -> Array:
     """Highest torque at a speed within the full-load curve."""
     return np.interp(speed_radps, engine.full_load_speed_radps, engine.full_load_torque_nm)
+
+
+def covered_torque_nm(engine: Engine, speed_radps: Array) -> Array:
+    """Highest torque that the engine gives and its data cover: full load, or less where a grid ends below it.
+
+    NaN where a grid knows nothing at a speed.
+    """
+    full = full_load_torque_nm(engine, speed_radps)
+    if not isinstance(engine.fuel, EngineGrid):
+        return full
+    grid = engine.fuel
+    known = grid.fuel_kgps if grid.nox_kgps is None else grid.fuel_kgps + grid.nox_kgps
+    return np.minimum(full, highest_known(grid.speed_radps, grid.torque_nm, known, speed_radps))
 
 
 def drag_torque_nm(engine: Engine, speed_radps: Array) -> Array:
@@ -112,11 +130,14 @@ def fuel_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> Array:
 
 
 def nox_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> Array:
-    """NOx flow; 0 while the fuel is cut is the caller's to apply. NaN outside a measured grid."""
+    """NOx flow; 0 while the fuel is cut is the caller's to apply. NaN outside a measured grid.
+
+    0 everywhere where it is not known, so that sums stay finite; `Engine.nox_known` tells.
+    """
+    if not engine.nox_known:
+        return np.zeros(np.broadcast(torque_nm, speed_radps).shape)
     if isinstance(engine.fuel, EngineGrid):
         return _on_grid(engine.fuel, engine.fuel.nox_kgps, torque_nm, speed_radps)
-    if engine.nox is None:
-        return np.zeros(np.broadcast(torque_nm, speed_radps).shape)
     k = engine.nox
     speed_rpm = speed_radps * 60 / (2 * pi)
     p_me = np.maximum(_mean_pressure_bar(engine, torque_nm), 0.0)

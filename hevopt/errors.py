@@ -2,6 +2,7 @@
 
     HevoptError            exit status
     ├── DataError          2   an input file, a name or an option is wrong
+    │   └── UnknownNoxError 2   NOx is asked of an engine without NOx data
     ├── InfeasibleError    3   nothing can follow the cycle, or keep the charge within its limits
     └── SolverError        3   a solver did not return what it promised
 
@@ -21,6 +22,10 @@ class DataError(HevoptError):
     """An input is missing, malformed or not physical."""
 
     exit_status = 2
+
+
+class UnknownNoxError(DataError):
+    """NOx is weighted or cut, and the engine's file has no data on it."""
 
 
 class InfeasibleError(HevoptError):

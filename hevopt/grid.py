@@ -42,6 +42,36 @@ def interpolated(
     return np.where(outside, np.nan, result)
 
 
+def highest_known(
+    grid_speed_radps: Array, grid_torque_nm: Array, values: Array, speed_radps: Array
+) -> Array:
+    """Highest torque at which `interpolated` knows the quantity at each speed; NaN where there is none."""
+    known = ~np.isnan(values)
+    i, x = _place(grid_speed_radps, speed_radps)
+    left, right = known[i], known[i + 1]
+    # On a grid line its own cells count alone, between two lines what both know.
+    both = np.where((x == 0)[..., None], left, np.where((x == 1)[..., None], right, left & right))
+    top = _last(both)
+    above = np.minimum(top + 1, len(grid_torque_nm) - 1)
+    # A cell above with one more known corner is used on the triangle, as far as its slanted edge.
+    share = np.where(_at(left, above), 1 - x, np.where(_at(right, above), x, 0.0))
+    share = np.where((x == 0) | (x == 1), 0.0, share)
+    torque = grid_torque_nm[top] + share * (grid_torque_nm[above] - grid_torque_nm[top])
+    # Just inside, so that a torque computed back from this one does not land in an unknown cell.
+    torque = torque - _ROUNDING * (grid_torque_nm[-1] - grid_torque_nm[0])
+    torque = np.maximum(torque, grid_torque_nm[0])
+    outside = np.abs(x - 0.5) > 0.5 + _ROUNDING
+    return np.where(outside | ~both.any(axis=-1), np.nan, torque)
+
+
+def _last(where: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return where.shape[-1] - 1 - np.argmax(where[..., ::-1], axis=-1)
+
+
+def _at(where: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return np.take_along_axis(where, index[..., None], axis=-1)[..., 0]
+
+
 def _place(axis: Array, at: Array) -> tuple[NDArray[np.int64], Array]:
     """The cell's number along an axis, and the share of it passed."""
     cell = np.clip(np.searchsorted(axis, at, "right") - 1, 0, len(axis) - 2)

@@ -50,6 +50,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "coastdown_c0_n": ("N", "C0 of the coast-down force C0 + C1 v + C2 v²"),
         "coastdown_c1_nspm": ("N s/m", "C1 of the coast-down force"),
         "coastdown_c2_ns2pm2": ("N s²/m²", "C2 of the coast-down force"),
+        "coastdown_mass_kg": ("kg", "mass of the car in the coast-downs: C0 is rolling resistance, in proportion "
+                              "to the car's mass with hybrid parts; without it C0 is the same for every mass"),
     },
     "EngineFile": {
         "name": _NAME,

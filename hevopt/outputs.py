@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hevopt.cycle import Cycle
+from hevopt.case import Case
 from hevopt.errors import DataError
 from hevopt.files import printable
 from hevopt.problem import Problem, Trajectory
@@ -65,7 +65,7 @@ def write_rows(path: Path, comparison: Comparison, about: Mapping[str, Any]) -> 
 def write_steps(
     path: Path, comparison: Comparison, steps: Columns, about: Mapping[str, Any]
 ) -> None:
-    """The steps of one or more drives, one line each; in JSON as "steps" beside the rows."""
+    """The steps of one or more drives, one line each, the cycle in front; in JSON as "steps" beside the rows."""
     if path.suffix.lower() == ".json":
         names = list(steps)
         lines = zip(*(map(_existing, values) for values in steps.values()), strict=True)
@@ -73,14 +73,17 @@ def write_steps(
         whole = {**result(comparison, about), "steps": records}
         write_whole(path, json.dumps(whole, allow_nan=False).encode())
     else:
-        _write_columns(path, steps, about)
+        lines = len(next(iter(steps.values()), ()))
+        _write_columns(path, {"cycle": [comparison.cycle] * lines, **steps}, about)
 
 
-def step_columns(cycle: Cycle, problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
+def step_columns(case: Case, trajectory: Trajectory) -> dict[str, Any]:
     """Column name to (time,) values: what the cycle asks, then what the car does, every power and loss.
 
     Step k goes from time_s to time_s + step_s; speed_mps is its mean, distance_m that driven at its end.
+    nox_kg: None where the engine has no data on it
     """
+    cycle, problem = case.cycle, case.problem
     step_s, speed = np.diff(cycle.time_s), cycle.speed_mps
     asked = {
         "time_s": problem.table.time_s,
@@ -91,10 +94,13 @@ def step_columns(cycle: Cycle, problem: Problem, trajectory: Trajectory) -> dict
         "grade": cycle.grade[:-1],
         "distance_m": np.cumsum(step_s * (speed[1:] + speed[:-1]) / 2),
     }
-    return asked | trajectory_columns(problem, trajectory)
+    columns = asked | _trajectory_columns(problem, trajectory)
+    if not case.car.engine.nox_known:
+        columns["nox_kg"] = [None] * len(step_s)
+    return columns
 
 
-def trajectory_columns(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
+def _trajectory_columns(problem: Problem, trajectory: Trajectory) -> dict[str, Any]:
     """Column name to (time,) values of a trajectory."""
     table = problem.table
     labels = [table.controls[c] for c in trajectory.control]

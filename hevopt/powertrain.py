@@ -33,6 +33,7 @@ Bits = NDArray[np.uint16]
 
 TORQUE_LEVELS = 41
 _ROUNDING_W = 1e-9
+_SHORTFALL_PASSES = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,13 +93,18 @@ def build_table(
     stuck = _stuck(branches)
     missing = np.zeros(len(demand.time_s))
     if stuck.any():
-        limits = [deliverable_nm(architecture, demand, branch.joint) for branch in branches]
-        short = demand.wheel_torque_nm - np.max(limits, axis=0)
-        missing = np.where(stuck, np.maximum(short, 0.0), 0.0)
+        missing = _missing_nm(architecture, demand, branches, stuck)
         if allow_shortfall:
-            demand = demand.with_torque(demand.wheel_torque_nm - missing)
-            branches = _branches(architecture, demand, levels, around)
-            stuck = _stuck(branches)
+            more = missing
+            # With less torque a launch is at a lower speed, where a map may cover less again.
+            for _ in range(_SHORTFALL_PASSES):
+                demand = demand.with_torque(demand.wheel_torque_nm - more)
+                branches = _branches(architecture, demand, levels, around)
+                stuck = _stuck(branches)
+                more = _missing_nm(architecture, demand, branches, stuck)
+                if not more.any():
+                    break
+                missing = missing + more
         if stuck.any():
             missing = np.zeros_like(missing) if allow_shortfall else missing
             raise InfeasibleError(
@@ -137,6 +143,15 @@ def _branches(
 
 def _rejects(branches: list[_Branch]) -> Bits:
     return np.hstack([branch.reject for branch in branches])
+
+
+def _missing_nm(
+    architecture: Architecture, demand: Demand, branches: list[_Branch], stuck: NDArray[np.bool_]
+) -> Array:
+    """(time,) wheel torque beyond what any joint delivers at the steps without a control; else 0."""
+    limits = [deliverable_nm(architecture, demand, branch.joint) for branch in branches]
+    short = demand.wheel_torque_nm - np.max(limits, axis=0)
+    return np.where(stuck, np.maximum(short, 0.0), 0.0)
 
 
 def _stuck(branches: list[_Branch]) -> NDArray[np.bool_]:

@@ -55,7 +55,7 @@ def function_rejects(
     start_stop            engine at rest while the car stands
     power_management      engine at rest, or dragged, while the machine drives; assistance
     nox_cut               assistance by the machine while the engine drives
-    e_boost               assistance only beyond the engine's full load
+    e_boost               assistance only beyond the engine's full load, or where a measured map ends below it
     regenerative_braking  charging while the car is braked
     Charging by the engine while it runs needs no function: any alternator does that.
     """
@@ -71,7 +71,7 @@ def function_rejects(
         banned |= motoring & (torques.engine <= 0)
         if not has("nox_cut"):
             speed = joint.engine_speed_radps[:, None]
-            full = engine_model.full_load_torque_nm(architecture.engine, speed)
+            full = engine_model.covered_torque_nm(architecture.engine, speed)
             banned |= motoring & ~(has("e_boost") & (torques.engine > full - _BOOST_SLACK_NM))
     if not has("regenerative_braking"):
         banned |= (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)

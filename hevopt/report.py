@@ -10,6 +10,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from hevopt.files import printable
 from hevopt.problem import Plan, Problem
 from hevopt.published import published_beside
 from hevopt.rows import Row
@@ -98,15 +99,44 @@ def comparison_notes(comparison: Comparison) -> str:
     objective = "fuel"
     if comparison.nox_weight:
         objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
+    reference = "nothing, every row failed"
+    if comparison.reference is not None:
+        reference = comparison.reference
     return (
-        f"vs ref: against {comparison.reference}. corrected: fuel less what the end charge is worth "
+        f"vs ref: against {reference}. corrected: fuel less what the end charge is worth "
         "(multiplier of the dual).\n"
+        f"{_end_notes(comparison)}"
         f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
         "gap: how far the row is above it.\n"
         f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
         "lower-bound DP = a cost-to-go nowhere above the true one."
+        f"{_nox_note(comparison)}"
     )
+
+
+def _end_notes(comparison: Comparison) -> str:
+    """What is asked of the end charge, where that is not the start's."""
+    if not comparison.end_asked:
+        return ""
+    cars: dict[float, list[str]] = {}
+    for car, soc in comparison.end_asked.items():
+        cars.setdefault(soc, []).append(printable(car))
+    asked = "; ".join(f"{soc:g} in {', '.join(names)}" for soc, names in cars.items())
+    return (
+        f"end charge asked, other than the start's: {asked}. ΔE/fuel and corrected count only what is left beyond "
+        "it;\nelectricity drawn from the battery down to it (or stored up to it) is not counted as fuel, nor in "
+        "vs ref.\n"
+    )
+
+
+def _nox_note(comparison: Comparison) -> str:
+    rows = comparison.rows
+    unknown = [r for r in rows if r.nox_mg_per_km is None and r.fuel_l_per_100km is not None]
+    if not unknown:
+        return ""
+    cars = ", ".join(dict.fromkeys(printable(row.architecture) for row in unknown))
+    return f"\nNOx is unknown for {cars}, whose engine has no data on it."
 
 
 def published_table(comparison: Comparison) -> Table | None:

@@ -19,7 +19,7 @@ _ROUNDING_J = 1.0
 @dataclass(frozen=True, slots=True)
 class Row:
     """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
-    no reference, no fuel, or a bound of 0.
+    no reference, no fuel, or a bound of 0; of NOx also where the engine has no data on it.
 
     status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy; "end charge missed" where
     another end charge than the start's is asked), "shortfall" (steps driven with less than the cycle asks), joined
@@ -70,7 +70,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
         status=_status(problem, surplus_j, fuel_j),
         fuel_l_per_100km=litres(fuel_kg),
         co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
-        nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km,
+        nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km if car.engine.nox_known else None,
         soc_start=float(trajectory.soc[0]),
         soc_end=float(trajectory.soc[-1]),
         delta_energy_percent=_percent(surplus_j, fuel_j),
@@ -119,11 +119,14 @@ def _status(problem: Problem, surplus_j: float, fuel_j: float) -> str:
     if 100 * abs(surplus_j) > max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J):
         neutral = problem.end_min_j == problem.start_j
         marks.append("not neutral" if neutral else "end charge missed")
+    return ", ".join(marks + shortfall_marks(problem)) or "ok"
+
+
+def shortfall_marks(problem: Problem) -> list[str]:
+    """What a status says of steps driven with less than the cycle asks; empty where there are none."""
     missing = problem.table.missing_torque_nm
-    if missing is not None and (missing > 0).any():
-        count = int((missing > 0).sum())
-        marks.append(f"shortfall at {count} step{'s' if count > 1 else ''}")
-    return ", ".join(marks) or "ok"
+    count = 0 if missing is None else int((missing > 0).sum())
+    return [f"shortfall at {count} step{'s' if count > 1 else ''}"] if count else []
 
 
 def engine_starts(problem: Problem, trajectory: Trajectory) -> int:

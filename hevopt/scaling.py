@@ -31,7 +31,7 @@ def scaled_engine(engine: Engine, factor: float) -> Engine:
             fuel,
             torque_nm=factor * fuel.torque_nm,
             fuel_kgps=factor * fuel.fuel_kgps,
-            nox_kgps=factor * fuel.nox_kgps,
+            nox_kgps=None if fuel.nox_kgps is None else factor * fuel.nox_kgps,
             motoring_torque_nm=factor * fuel.motoring_torque_nm,
         )
     return replace(

@@ -81,6 +81,7 @@ class Effect:
 
     fuel_l_per_100km: charge-corrected; delta_*: change against the car as given, per cent
     elasticity: None where a value or a result is 0, or the values cannot be put in proportion
+    NOx is None where the engine has no data on it
     """
 
     architecture: str
@@ -90,7 +91,7 @@ class Effect:
     values: list[float]
     fuel_l_per_100km: list[float]
     delta_percent: list[float]
-    nox_mg_per_km: list[float]
+    nox_mg_per_km: list[float | None]
     delta_nox_percent: list[float | None]
     elasticity: float | None
     elasticity_nox: float | None
@@ -222,7 +223,7 @@ def _times(value: Any, factor: float) -> Any:
 
 def _effect(trial: _Trial, given: Row, rows: Sequence[Row]) -> Effect:
     fuel = [float(row.fuel_corrected_l_per_100km) for row in rows]
-    nox = [float(row.nox_mg_per_km) for row in rows]
+    nox = [row.nox_mg_per_km for row in rows]
     return Effect(
         given.architecture,
         given.strategy,
@@ -234,7 +235,7 @@ def _effect(trial: _Trial, given: Row, rows: Sequence[Row]) -> Effect:
         nox,
         [100 * (n / given.nox_mg_per_km - 1) if given.nox_mg_per_km else None for n in nox],
         _elasticity(trial.values, fuel),
-        _elasticity(trial.values, nox),
+        None if None in nox else _elasticity(trial.values, nox),
     )
 
 

@@ -1,6 +1,6 @@
 """The study: run strategies on architectures over one cycle, and collect a row for each."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -8,20 +8,31 @@ from time import perf_counter
 from typing import Any
 
 from hevopt.architecture import Architecture, load_architecture
-from hevopt.case import Case, prepare
+from hevopt.case import Case, prepare, require_nox
 from hevopt.cycle import DISTANCE_MIN_M, Cycle, load_cycle
-from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
+from hevopt.errors import (
+    DataError,
+    HevoptError,
+    InfeasibleError,
+    SolverError,
+    UnknownNoxError,
+)
 from hevopt.files import shipped_names
 from hevopt.powertrain import build_problem
 from hevopt.problem import Plan, Problem, Trajectory
 from hevopt.rows import Row, against_reference, failed_row, row_of
 from hevopt.simulation import simulate
-from hevopt.strategies import fitting, strategy_named
+from hevopt.strategies import STRATEGIES, fitting, strategy_named
+
+_FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All rows of a cycle, and the messages of what failed, by architecture and strategy."""
+    """All rows of a cycle, and the messages of what failed, by architecture and strategy.
+
+    end_asked: car -> state of charge asked at the end, of those where it is another than the start's
+    """
 
     cycle: str
     rows: list[Row]
@@ -29,6 +40,7 @@ class Comparison:
     nox_weight: float = 0.0
     reference: str | None = None
     free_gear: bool = False
+    end_asked: Mapping[str, float] = field(default_factory=dict)
 
 
 def solve(problem: Problem, strategy: str = "dp", **settings: Any) -> Plan:
@@ -58,6 +70,7 @@ def compare(
     changes: key path -> value in every architecture that is read, see load_architecture.
     progress: called with what comes next, and how many cases of how many are done.
     observe: called with every solved case, its row (no reference yet), plan and trajectory.
+    Where an engine has no NOx data, what asks for NOx is a failed row; UnknownNoxError if nothing else is asked.
     """
     if not isinstance(cycle, Cycle):
         cycle = load_cycle(cycle)
@@ -66,6 +79,7 @@ def compare(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
     plans = _plans(architectures, strategies, free_gear, changes)
+    check_horizon(horizon_s, [name for _, names in plans for name in names])
     total = sum(len(names) for _, names in plans)
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
@@ -80,7 +94,7 @@ def compare(
                 allow_shortfall=allow_shortfall,
                 refine=refine,
             )
-        except (InfeasibleError, SolverError) as error:
+        except _FAILURES as error:
             failures[car.name] = error
             rows += [failed_row(car, name, error) for name in wanted]
             continue
@@ -90,11 +104,31 @@ def compare(
                 solved = run_case(case, name, horizon_s)
                 rows.append(solved[0])
                 observe(case, *solved)
-            except (InfeasibleError, SolverError) as error:
+            except _FAILURES as error:
                 failures[f"{car.name} {name}"] = error
                 rows.append(failed_row(car, name, error))
+    if all(row.fuel_l_per_100km is None for row in rows):
+        unknown = [error for error in failures.values() if isinstance(error, UnknownNoxError)]
+        if unknown and len(unknown) == len(failures):
+            raise unknown[0]
     rows, reference = against_reference(rows)
-    return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear)
+    asked = end_asked(car for car, _ in plans)
+    return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear, asked)
+
+
+def end_asked(cars: Iterable[Architecture]) -> dict[str, float]:
+    """Car -> state of charge asked at the end, of those where it is another than the start's."""
+    return {car.name: car.soc_end for car in cars if car.soc_end != car.soc_start}
+
+
+def check_horizon(horizon_s: float | None, strategies: Iterable[str]) -> None:
+    """DataError for a preview that none of the strategies takes."""
+    if horizon_s is None or any(strategy_named(name).previews for name in strategies):
+        return
+    able = ", ".join(name for name, strategy in STRATEGIES.items() if strategy.previews)
+    raise DataError(
+        f"horizon_s {horizon_s:g}: no strategy asked for looks ahead; add one that does ({able}), or leave it out"
+    )
 
 
 def _plans(
@@ -113,9 +147,19 @@ def _plans(
     )
     cars = [car.with_free_gear() for car in cars] if free_gear else cars
     return [
-        (car, fitting(car.functions, every=every) if every or not strategies else list(strategies))
+        (car, _usual(car, every=every) if every or not strategies else list(strategies))
         for car in cars
     ]
+
+
+def _usual(car: Architecture, *, every: bool) -> list[str]:
+    """What fits a car; without NOx data, no strategy that cuts it."""
+    names = fitting(car.functions, every=every)
+    return [name for name in names if car.engine.nox_known or not _cuts_nox(name)]
+
+
+def _cuts_nox(strategy: str) -> bool:
+    return "nox_cut" in strategy_named(strategy).needs
 
 
 def _cars(
@@ -148,7 +192,12 @@ def _check_strategies(names: Sequence[str]) -> None:
 def run_case(
     case: Case, strategy: str, horizon_s: float | None = None
 ) -> tuple[Row, Plan, Trajectory]:
-    """One strategy on a case: its row (no reference yet), plan and trajectory."""
+    """One strategy on a case: its row (no reference yet), plan and trajectory.
+
+    Raises UnknownNoxError for a strategy that cuts NOx where the engine has no data on it.
+    """
+    if _cuts_nox(strategy):
+        require_nox(case.car, f"strategy {strategy}")
     plan, trajectory, solve_s = case.dp_plan, case.dp_trajectory, case.dp_s
     if strategy != "dp":
         settings = _settings(case, strategy, horizon_s)

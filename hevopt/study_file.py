@@ -116,17 +116,29 @@ def read_study(path: Path) -> Settings:
         if key in contents:
             raise DataError(f"{path}: {key} is a key of {what}")
     settings = settings_of(str(path), contents)
-    given, changes = dict(settings.given), dict(settings.changes)
+    given = dict(settings.given)
     if "cycle" in given:
         given["cycle"] = beside_study(path, given["cycle"], ".csv")
     if "architectures" in given:
         given["architectures"] = [beside_study(path, a, ".toml") for a in given["architectures"]]
+    return Settings(given, _beside(path, settings.changes), path)
+
+
+def changes_in(path: Path, contents: Mapping[str, Any]) -> dict[str, Any]:
+    """Key path -> value of a study file's [set], its paths taken from where it lies."""
+    table = contents.get("set")
+    return _beside(path, _flat(table)) if isinstance(table, Mapping) else {}
+
+
+def _beside(path: Path, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Changes with the files of components taken from where the study lies."""
+    changes = dict(changes)
     for key in COMPONENTS:
         if isinstance(value := changes.get(key), str):
             changes[key] = beside_study(path, value, ".toml")
         elif isinstance(value, dict) and isinstance(value.get("file"), str):
             changes[key] = {**value, "file": beside_study(path, value["file"], ".toml")}
-    return Settings(given, changes, path)
+    return changes
 
 
 def settings_of(place: str, contents: Mapping[str, Any]) -> Settings:

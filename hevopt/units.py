@@ -52,9 +52,12 @@ _SPELLINGS: dict[str, dict[str, float]] = {
         "h hr hour hours": 3600.0,
     },
     "speed": {
-        "m/s mps m/sec ms-1 meter/s metre/s": 1.0,
-        "km/h kmh kph kmph km/hr kmh-1 km/hour": 1 / 3.6,
-        "mph mi/h mile/h miles/h mi/hr": 0.44704,
+        "m/s mps m/sec ms-1 meter/s metre/s meters/s metres/s meter/second metre/second meters/second "
+        "metres/second meters/sec meterpersecond metrepersecond meterspersecond metrespersecond": 1.0,
+        "km/h kmh kph kmph km/hr km/hrs kmh-1 km/hour kmhr kmperhour kilometer/hour kilometre/hour "
+        "kilometers/hour kilometres/hour kilometerperhour kilometreperhour kilometersperhour "
+        "kilometresperhour": 1 / 3.6,
+        "mph mi/h mile/h miles/h mi/hr mile/hour miles/hour miles/hr mileperhour milesperhour": 0.44704,
         "kn kt kts knot knots": 1852 / 3600,
         "ft/s ft/sec fts-1": 0.3048,
     },

@@ -3,19 +3,27 @@
 What a TOML file is, is told by its keys: the kind that knows most of them.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from hevopt.architecture import COMPONENTS, component_contents, load_architecture
+from hevopt.architecture import (
+    COMPONENTS,
+    component_contents,
+    load_architecture,
+    sorted_changes,
+)
 from hevopt.cycle import faults_in, load_cycle
 from hevopt.datafile import FileModel, faults_of, read_contents
 from hevopt.errors import DataError, HevoptError
 from hevopt.file_schema import MODELS
 from hevopt.files import find, is_path, printable, read_text, shipped_names, shown
+from hevopt.keypaths import with_changes
 from hevopt.strategies import strategy_named
-from hevopt.study_file import CompareFile, beside_study, cars_of, read_study
+from hevopt.study import check_horizon
+from hevopt.study_file import KEYS, CompareFile, beside_study, cars_of, changes_in, read_study
 from hevopt.sweeps import study_file as sweep_file
 from hevopt.units import KMH_PER_MPS
 
@@ -26,6 +34,10 @@ _KINDS: dict[str, type[FileModel]] = {
     SWEEP: sweep_file.StudyFile,
 }
 _FOLDERS = {".toml": "architectures", ".csv": "cycles"}
+_SHIPPED = (
+    *((folder, suffix) for suffix, folder in _FOLDERS.items()),
+    ("architectures/components", ".toml"),
+)
 _LINES_LISTED = 20
 _MEGABYTES_MAX = 50
 _KEYS_LISTED = 200
@@ -79,10 +91,16 @@ def _file(name: str) -> Path:
         raise DataError(
             f"{shown(name)} cannot be looked up ({error.strerror}); check the path"
         ) from None
-    for suffix, kind in _FOLDERS.items():
-        if name in shipped_names(kind, suffix):
-            return find(kind, name, suffix)
-    return path
+    names = {n: (kind, suffix) for kind, suffix in _SHIPPED for n in shipped_names(kind, suffix)}
+    if name in names:
+        kind, suffix = names[name]
+        return find(kind, name, suffix)
+    close = get_close_matches(name, names, n=3)
+    hint = f"close matches: {', '.join(close)}; " if close else ""
+    raise DataError(
+        f"{printable(name)}: no such file, and no shipped architecture, component or cycle has that name; {hint}"
+        "give the path of a file or such a name"
+    )
 
 
 def _kind_of(path: Path, contents: dict[str, Any]) -> str:
@@ -106,10 +124,7 @@ def _kind_of(path: Path, contents: dict[str, Any]) -> str:
 def _architecture(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str], str]:
     faults = _table_faults(str(path), contents, MODELS[kind])
     for key in COMPONENTS:
-        value = contents.get(key)
-        if isinstance(value, str) or (
-            isinstance(value, dict) and isinstance(value.get("file"), str)
-        ):
+        if _is_component(value := contents.get(key)):
             try:
                 part = component_contents(path, key, value, {})
             except DataError as error:
@@ -120,6 +135,11 @@ def _architecture(path: Path, contents: dict[str, Any], kind: str) -> tuple[list
         return faults, ""
     car = load_architecture(path.absolute() if path.suffix != ".toml" else path)
     return [], f"{car.name}: {car.description}" if car.description else car.name
+
+
+def _is_component(value: Any) -> bool:
+    named = isinstance(value, dict) and isinstance(value.get("file"), str)
+    return isinstance(value, str) or named
 
 
 def _component(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str], str]:
@@ -144,10 +164,95 @@ def _compare(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str]
     for name in names("strategies"):
         if name != "all":
             faults += _tried(path, "strategies", lambda name=name: strategy_named(name))
-    if not faults:
-        faults = _tried(path, "settings", lambda: cars_of(read_study(path)))
-    cars = names("architectures") or ["the shipped architectures"]
-    return faults, ", ".join([*(names("cycle") or ["nedc"]), *cars])
+    cars = names("architectures")
+    good = not faults
+    try:
+        changes = changes_in(path, contents)
+    except DataError as error:
+        faults += [f"{path}: {line}" for line in _lines(error)]
+    else:
+        in_set = _set_faults(path, changes, cars)
+        faults += in_set
+        if good:
+            if names("strategies") != ["all"]:
+                faults += _tried(
+                    path,
+                    "strategies",
+                    lambda: check_horizon(contents.get("horizon_s"), names("strategies")),
+                )
+            faults += _settings_faults(path, _good(path, changes, cars) if in_set else changes)
+    listed = cars or ["the shipped architectures"]
+    return faults, ", ".join([*(names("cycle") or ["nedc"]), *listed])
+
+
+def _settings_faults(path: Path, changes: Mapping[str, Any]) -> list[str]:
+    """Faults that settings have in the cars, the ones of the battery's charge together, the others one by one."""
+    try:
+        settings = read_study(path)
+    except DataError as error:
+        return _lines(error)
+    groups: dict[str, list[str]] = {}
+    for name in KEYS.keys() & settings.given.keys():
+        groups.setdefault(name.partition("_")[0], []).append(name)
+    shared = {name: value for name, value in settings.given.items() if name not in KEYS}
+    faults = []
+    for names in ([], *(groups[first] for first in sorted(groups))):
+        given = shared | {name: settings.given[name] for name in names}
+        part = replace(settings, given=given, changes=changes)
+        faults += _tried(path, "settings", lambda part=part: cars_of(part))
+    return list(dict.fromkeys(faults))
+
+
+def _good(path: Path, changes: Mapping[str, Any], cars: Sequence[str]) -> dict[str, Any]:
+    """The changes that have no fault by themselves."""
+    return {k: v for k, v in changes.items() if not _set_faults(path, {k: v}, cars)}
+
+
+def _set_faults(path: Path, changes: Mapping[str, Any], cars: Sequence[str]) -> list[str]:
+    """What [set] makes of the cars, every fault of every component; cars with faults of their own are left out."""
+    place, faults = f"{path}, set", []
+    own, of_parts = sorted_changes(changes)
+    if not changes:
+        return []
+    for name in cars or shipped_names("architectures", ".toml"):
+        try:
+            car = find("architectures", beside_study(path, name, ".toml"), ".toml")
+            plain = read_contents(car)
+            if _architecture(car, plain, "architecture")[0]:
+                continue
+        except DataError:
+            continue
+        table, found = _changed(place, plain, own, "")
+        faults += found + _table_faults(place, table, MODELS["architecture"])
+        for key in COMPONENTS:
+            if (own.keys() & {key} or of_parts[key]) and _is_component(value := table.get(key)):
+                faults += _part_faults(f"{place} {key}", car, key, value, of_parts[key])
+    return list(dict.fromkeys(faults))
+
+
+def _part_faults(
+    place: str, car: Path, key: str, value: str | dict[str, Any], changes: Mapping[str, Any]
+) -> list[str]:
+    """Faults of a car's component once it is replaced or changed."""
+    try:
+        plain = component_contents(car, key, value, {}).contents
+    except DataError as error:
+        return [f"{place}: {line}" for line in _lines(error)]
+    table, faults = _changed(place, plain, changes, f"{key}.")
+    return faults + _table_faults(place, table, MODELS[key])
+
+
+def _changed(
+    place: str, table: dict[str, Any], changes: Mapping[str, Any], within: str
+) -> tuple[dict[str, Any], list[str]]:
+    """A table with those changes made that can be, and the faults of the others."""
+    faults = []
+    for key, value in changes.items():
+        try:
+            table = with_changes(table, {key: value}, within)
+        except DataError as error:
+            faults += [f"{place}: {line}" for line in _lines(error)]
+    return table, faults
 
 
 def _sweep(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str], str]:

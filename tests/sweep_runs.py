@@ -144,5 +144,5 @@ def table(store):
     """The cases of a store as lines of its table, without the seconds."""
     with open_to_read(store) as reader:
         lines = list(csv.reader(io.StringIO(csv_of(reader).decode())))
-    assert lines[0][-1] == "solve_s"
+    assert lines[0][-1] == "case_s"
     return [line[:-1] for line in lines]

@@ -11,10 +11,45 @@ from hevopt import load_architecture
 from hevopt import machine as machine_model
 from hevopt._battery_kernels import chemical_power_at
 from hevopt.battery import Battery
+from hevopt.car_file import CarFile
+from hevopt.components import vehicle_of
 from hevopt.engine import EngineGrid
 from hevopt.transmission import input_torque_nm, output_torque_nm
+from hevopt.vehicle import tractive_force_n
 
 RPM = 2 * pi / 60
+
+
+def coastdown_car(mass_kg: float, **load: float) -> CarFile:
+    """A car whose coast-downs gave 130 N, 2 N s/m and 0.38 N s²/m²."""
+    load |= {"coastdown_c0_n": 130.0, "coastdown_c1_nspm": 2.0, "coastdown_c2_ns2pm2": 0.38}
+    return CarFile(
+        name="x", mass_kg=mass_kg, tyre_radius_m=0.3, wheel_inertia_kgm2=2.7, auxiliary_power_w=0.0,
+        road_load=load,
+    )  # fmt: skip
+
+
+def test_coastdown_c0_grows_with_the_mass_over_that_of_the_test_by_hand():
+    # 1000 kg tested, 1150 kg and 50 kg of hybrid parts: C0 = 130 x 1.2 = 156 N. 30 % climb at 20 m/s:
+    # sqrt(1.09) = 1.0440307, so 156 / 1.0440307 = 149.4209 N rolling, 2 x 20 + 0.38 x 400 = 192 N air,
+    # 1200 x 9.80665 x 0.3 / 1.0440307 = 3381.5046 N climbing.
+    vehicle = vehicle_of(coastdown_car(1150.0, coastdown_mass_kg=1000.0), 50.0)
+    force = tractive_force_n(vehicle, np.array([20.0]), np.zeros(1), np.array([0.3]))
+    assert force[0] == pytest.approx(149.4209 + 192.0 + 3381.5046, abs=1e-3)
+    level = tractive_force_n(vehicle, np.array([20.0]), np.zeros(1), np.zeros(1))
+    assert level[0] == pytest.approx(348.0, rel=1e-14)
+
+
+def test_without_its_mass_coastdown_c0_is_the_same_for_every_car():
+    for mass_kg in (1000.0, 1800.0):
+        vehicle = vehicle_of(coastdown_car(mass_kg), 50.0)
+        assert vehicle.rolling_n == (0.0, 0.0, 0.0, 0.0)
+        assert vehicle.air_n == (130.0, 2.0, 0.38, 0.0)
+
+
+def test_at_the_mass_of_the_test_coastdown_c0_is_as_measured():
+    vehicle = vehicle_of(coastdown_car(1000.0, coastdown_mass_kg=1000.0), 0.0)
+    assert vehicle.rolling_n[0] == 130.0 and vehicle.air_n == (0.0, 2.0, 0.38, 0.0)
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import pytest
 from conftest import CYCLES
 
 from hevopt import load_cycle
+from hevopt.errors import DataError
 from hevopt.files import shipped_names
 
 # Duration s, distance km, top speed km/h. NEDC: UN R83, annex 4a. WLTC: UN GTR 15, annex 1. UDDS, FTP-75, US06:
@@ -68,3 +69,18 @@ def test_a_byte_order_mark_and_comments_are_read_over(tmp_path):
     path = tmp_path / "bom.csv"
     path.write_text("\ufeff# made by hand\ntime_s,speed_mps\n0,0\n# middle\n1,2\n")
     assert load_cycle(path).distance_m == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("log.csv", "Time (sec);Speed\n0;1\n"),
+        ("log.csv", "time_s,gear\n0,1\n"),
+        ("log.xlsx", "PK"),
+        ("log.mat", ""),
+    ],
+)
+def test_a_log_in_place_of_a_cycle_file_is_sent_to_the_import(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(DataError, match="`hevopt cycles import FILE --out NAME"):
+        load_cycle(tmp_path / name)

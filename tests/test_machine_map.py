@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from hevopt import DataError, build_problem, load_architecture, load_cycle, simulate, solve
 from hevopt import machine as machine_model
 from hevopt.files import shipped_folder
-from hevopt.grid import interpolated
+from hevopt.grid import highest_known, interpolated
 from hevopt.machine import LossGrid
 from hevopt.problem import Reject
 
@@ -49,6 +49,22 @@ def test_two_corners_are_their_edge_and_nothing_beside_it():
     values = np.array([[1.0, 2.0], [np.nan, np.nan]])
     assert interpolated(axis, axis, values, np.array(0.25), np.array(0.0)) == 1.25
     assert np.isnan(interpolated(axis, axis, values, np.array(0.25), np.array(1e-6)))
+
+
+def test_the_highest_known_torque_is_where_a_scan_finds_the_end_of_the_map():
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        speed, torque = np.cumsum(rng.uniform(1, 3, (2, 7)), axis=1)
+        values = rng.random((7, 7))
+        for row in values:
+            row[rng.integers(1, 8) :] = np.nan
+        at = np.append(rng.uniform(speed[0], speed[-1], 30), speed)
+        found = highest_known(speed, torque, values, at)
+        assert not np.isnan(interpolated(speed, torque, values, found, at)).any()
+        scan = np.linspace(torque[0], torque[-1], 401)
+        known = ~np.isnan(interpolated(speed, torque, values, scan, at[:, None]))
+        assert_allclose(found, np.where(known, scan, 0).max(axis=1), atol=scan[1] - scan[0])
+        assert np.isnan(highest_known(speed, torque, values, speed[-1:] + 1)).all()
 
 
 def test_the_map_is_the_formula_at_its_points_and_close_between_them(formula):

@@ -242,6 +242,7 @@ def test_assignments_are_toml_values(texts, changes):
         (("--mass", "1400", "--set", "car.mass_kg=1400"), "are one; leave one of them out"),
         (("--soc-start", "0.9"), "start 0.9 must lie in [0.4, 0.8]"),
         (("nix.toml",), "nix.toml: cannot be read"),
+        (("--strategies", "dp,ecms", "--horizon", "30"), "horizon_s 30: no strategy asked for looks ahead"),
     ],
 )  # fmt: skip
 def test_a_wrong_option_is_one_message(hevopt, words, said):
@@ -269,6 +270,67 @@ def test_a_wrong_study_is_one_message(hevopt, text, said):
     status, out, err = hevopt("compare", "study.toml")
     assert (status, out) == (2, "") and err.count("hevopt: ") == 1
     assert said in err
+
+
+@pytest.fixture
+def engine(hevopt):
+    """The start of options that give a car an engine whose measured map has no NOx."""
+    Path("engine.toml").write_text(
+        'name = "bench"\ndisplacement_cm3 = 1600\nbore_mm = 80\nstroke_mm = 80\n'
+        "idle_rpm = 800\ninertia_kgm2 = 0.2\n"
+        "start_fuel_g = 0.2\nfuel = { heating_value_mjpkg = 42.9, density_kgpl = 0.835, co2_kgpkg = 3.16 }\n"
+        "full_load = { speed_rpm = [800, 4500], torque_nm = [200, 200] }\n[fuel_map]\nspeed_rpm = [0, 4500]\n"
+        "torque_nm = [-60, 200]\nfuel_gps = [[0, 0.01], [0, 7]]\nmotoring_torque_nm = [-15, -25]\n"
+    )
+    return ("compare", "--cycle", "short.csv", "--set", "engine=./engine.toml")
+
+
+def test_unknown_nox_is_none_and_not_zero(hevopt, engine):
+    words = (*engine, "--architectures", "A,C2")
+    status, out, err = hevopt(
+        *words, "--json", "--out-steps", "steps.json", "--report", "page.html"
+    )
+    assert status == 0, err
+    rows = json.loads(out)["rows"]
+    assert [row["strategy"] for row in rows] == ["baseline", "conventional", "ecms", "dp"]
+    assert all(row["fuel_l_per_100km"] > 0 for row in rows)
+    assert (
+        {row["nox_mg_per_km"] for row in rows}
+        == {row["delta_nox_percent"] for row in rows}
+        == {None}
+    )
+    assert {step["nox_kg"] for step in json.loads(Path("steps.json").read_text())["steps"]} == {
+        None
+    }
+    assert "NOx unknown" in Path("page.html").read_text()
+    said = hevopt(*words, "--strategies", "dp")[1]
+    assert "NOx is unknown for A, C2, whose engine has no data on it." in said
+
+
+def test_what_asks_for_unknown_nox_is_refused_and_the_rest_solved(hevopt, engine):
+    words = (*engine, "--architectures", "C2")
+    for asked in (("--nox-weight", "2"), ("--strategies", "nox_cut")):
+        status, out, err = hevopt(*words, *asked)
+        assert (status, out) == (2, "") and err.count("hevopt: error: ") == 1
+        assert "needs NOx data, but engine 'bench' has none" in err
+    status, out, err = hevopt(*words, "--strategies", "nox_cut,dp", "--json")
+    cut, dp = json.loads(out)["rows"]
+    assert status == 2 and "C2 nox_cut: C2: strategy nox_cut needs NOx data" in err
+    assert cut["status"].startswith("failed: ") and dp["status"] == "ok"
+    for command in (("pareto", "C2"), ("table", "C2", "--nox-weight", "2", "--out", "t.npz")):
+        status, _, err = hevopt(*command, *words[1:5])
+        assert status == 2 and "needs NOx data" in err
+
+
+def test_notes_say_what_an_asked_end_charge_means_and_when_there_is_no_reference(hevopt):
+    words = ("compare", "--cycle", "short.csv", "--architectures", "A,C2", "--strategies", "dp")
+    out = hevopt(*words, "--soc-end", "0.58")[1]
+    assert "end charge asked, other than the start's: 0.58 in C2." in out
+    assert "is not counted as fuel" in out
+    assert "end charge asked" not in hevopt(*words)[1]
+    Path("steep.csv").write_text("time_s,speed_kmh,grade\n0,0,0.5\n5,100,0.5\n10,200,0.5\n20,0,0\n")
+    status, out, _ = hevopt("compare", "--cycle", "steep.csv", *words[3:])
+    assert status == 3 and "vs ref: against nothing, every row failed." in out
 
 
 def test_a_wrong_setting_from_python_is_a_data_error():

@@ -56,9 +56,15 @@ def test_all_faults_of_an_architecture_and_its_components_are_listed_with_key_va
     found = validate(bad)
     assert (found.kind, found.count) == ("architecture", 10)
     for place, words in [
-        ("bad.toml", "functions.1 = 'boost': allowed: 'start_stop', 'e_boost'"),
+        (
+            "bad.toml",
+            "functions.1 = 'boost': close matches: e_boost; allowed: 'start_stop', 'e_boost'",
+        ),
         ("bad.toml", "unknown key hybrid_mas_kg; close matches: hybrid_mass_kg; allowed: name"),
-        ("bad.toml", "coupling.kind = 'gearbox_inputt': allowed: 'none', 'belt'"),
+        (
+            "bad.toml",
+            "coupling.kind = 'gearbox_inputt': close matches: gearbox_input, gearbox_output; allowed: 'none'",
+        ),
         ("bad.toml", "coupling.second_clutch = 1: true or false is needed"),
         ("car.mass_kg, car.tyre_radius_m changed in bad.toml", "mass_kg = -5; allowed: 50 to 1000"),
         ("changed in bad.toml", "tyre_radius_m = 'x': a number is needed"),
@@ -134,6 +140,37 @@ def test_study_files_are_checked_with_all_they_name(bad):
     assert validate("good.toml").about == "nedc, A" and not validate("good.toml").faults
     Path("unfit.toml").write_text('architectures = ["A"]\nsoc_end = 0.5\n')
     assert "not for A" in validate("unfit.toml").faults[0]
+
+
+def test_every_fault_that_a_study_sets_in_its_cars_is_listed_once(folder):
+    Path("study.toml").write_text(
+        'architectures = ["A", "C2"]\nstrategies = ["dp"]\nsoc_start = 0.9\nshift_cost_g = 0.2\nhorizon_s = 9\n'
+        '[set]\nmachine.powr_max_w = 2e4\nengine.scale.displacement = "big"\nfoo.x = 1\ngearbox.ratios.7 = 1\n'
+    )
+    found = validate("study.toml")
+    for words in (
+        "set: unknown key foo; allowed: name",
+        "set machine: unknown key powr_max_w; close matches: power_max_w",
+        "set engine: scale.displacement = 'big': a number is needed",
+        "set gearbox: change of 'gearbox.ratios.7': 'gearbox.ratios' is a list of 6 values",
+        "strategies: horizon_s 9: no strategy asked for looks ahead",
+        "settings: shift_cost_g = 0.2: not for A, C2",
+        "start 0.9 must lie in [0.4, 0.8]",
+    ):
+        assert sum(words in fault for fault in found.faults) == 1, (words, found.faults)
+    assert found.count == 7
+    Path("study.toml").write_text('mass = 1\n[set]\nbattery = "nix"\nengine.idle_rpm = -1\n')
+    text = "\n".join(validate("study.toml").faults)
+    assert "unknown key mass;" in text and "component 'nix' not found" in text
+    assert "set engine: idle_rpm = -1; allowed: 50 to 5000" in text
+
+
+def test_shipped_names_of_every_kind_are_known(folder):
+    for name, kind in (("C2", "architecture"), ("engine_diesel_1600", "engine"), ("nedc", "cycle")):
+        found = validate(name)
+        assert (found.kind, found.faults) == (kind, [])
+    (fault,) = validate("engine_disel_1600").faults
+    assert "close matches: engine_diesel_1600" in fault
 
 
 @pytest.mark.parametrize(

@@ -79,8 +79,15 @@ class Files:
     _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
 
     def check(self, job: Job) -> None:
-        """DataError, before anything is solved, where a file cannot be written, is an input, or is named twice."""
+        """DataError, before anything is solved, where a file cannot be written, is an input, or is named twice, and
+        for fronts of NOx where an engine has no data on it.
+        """
         self._check_tables(job)
+        if self.fronts:
+            from hevopt.case import require_nox
+
+            for car in job.cars.cars:
+                require_nox(car, "--fronts")
         if self.page is None and self.save is None:
             if self.fronts or self.effects:
                 raise DataError(
@@ -117,7 +124,7 @@ class Files:
         if self.steps is not None:
             from hevopt.outputs import step_columns
 
-            self._driven.append((row, step_columns(case.cycle, case.problem, trajectory)))
+            self._driven.append((row, step_columns(case, trajectory)))
 
     def write(self, job: Job, comparison: "Comparison") -> list[str]:
         """Write all of them; a line for each."""

@@ -81,6 +81,8 @@ def import_map(
 
     values = _values(given)
     if displacement_cm3 is not None:
+        if "displacement_cm3" in values:
+            raise DataError("--displacement-cm3 and --set displacement_cm3 are one key; give one")
         values["displacement_cm3"] = displacement_cm3
     extra = {"full": full_load, "motoring": motoring, "nox": nox}
     request = _request(file, sheet, column, unit, rows, like, extra, values)
@@ -128,7 +130,9 @@ def coastdown(
     like: _LikeOption = None,
     given: _SetOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="Car file to write.")] = None,
-    plot: Annotated[Path | None, typer.Option("--plot", help="PNG file to write.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Picture to write: .png, .svg or .pdf.")
+    ] = None,
     directions: Annotated[
         str | None, typer.Option("--directions", help="Of the runs in order, such as +,-,+,-.")
     ] = None,
@@ -138,13 +142,14 @@ def coastdown(
 ) -> None:
     """C0, C1, C2 of the road load from coast-downs in both directions, with confidence intervals."""
     from hevopt.imports.coastdown import fit_road_load
-    from hevopt.imports.coastdown_car import car_base, car_contents, check_mass
+    from hevopt.imports.coastdown_car import car_base, car_contents, check_mass, said_of_mass
     from hevopt.imports.coastdown_report import results
     from hevopt.imports.coastdown_runs import ROLES, ROLES_WITH_UNIT, read_runs
     from hevopt.imports.component_text import component_text
     from hevopt.writing import write_whole
 
     _check_outs([path for path in (out, plot) if path is not None], files)
+    kind = None if plot is None else _picture_kind(plot)
     values = _values(given) | {
         key: value
         for key, value in (
@@ -162,6 +167,7 @@ def coastdown(
     fit = fit_road_load(runs, mass_kg + car.rotating_kg)
     said = results(runs, fit, mass_kg, car.rotating_kg)
     contents = None if out is None else car_contents(fit, car, mass_kg)
+    said += said_of_mass(mass_kg) if contents else []
     for note in notes:
         write(f"  {printable(note)}")
     write("\n".join(said))
@@ -169,14 +175,17 @@ def coastdown(
         head = [
             "Car with a road load from coast-downs, written by hevopt coastdown.",
             *_digests(files),
+            *notes,
             *said,
         ]
         write_whole(out, component_text(head, contents, car.origins).encode())
         write(f"car written to {out}")
+    else:
+        write(f"no {'car ' * (plot is not None)}file written; --out FILE writes the car")
     if plot is not None:
         from hevopt.imports.figures import coastdown_figure
 
-        write_whole(plot, coastdown_figure(runs, fit))
+        write_whole(plot, coastdown_figure(runs, fit, kind))
         write(f"plot written to {plot}")
 
 
@@ -241,6 +250,15 @@ def _ways(text: str) -> list[int]:
             f"--directions {shown(text)}: {shown(wrong[0])}; allowed: + and -, such as +,-,+,-"
         )
     return [known[word] for word in words]
+
+
+def _picture_kind(path: Path) -> str:
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise DataError(
+            f"--plot {printable(str(path))}: the name ends with no kind of picture; allowed: .png, .svg and .pdf"
+        )
+    return kind
 
 
 def _beside(path: Path, suffix: str) -> Path:

@@ -128,6 +128,7 @@ def run(
     from hevopt.study_file import cars_of, settings_of
 
     strategy_named(strategy)
+    study.check_horizon(horizon, [strategy])
     named = {"refine": refine, "horizon_s": horizon}
     options = given | {name: value for name, value in named.items() if value is not None}
     settings = settings_of(_OPTIONS, options)
@@ -148,9 +149,16 @@ def run(
         )
         progress(f"{car.name}: {strategy}", 0, 1)
         row, plan, trajectory = study.run_case(case, strategy, horizon)
-    comparison = study.Comparison(trace.name, [row], {}, nox_weight, "nothing, a single run")
+    comparison = study.Comparison(
+        trace.name,
+        [row],
+        {},
+        nox_weight,
+        "nothing, a single run",
+        end_asked=study.end_asked([car]),
+    )
     if out is not None:
-        columns = outputs.step_columns(trace, case.problem, trajectory)
+        columns = outputs.step_columns(case, trajectory)
         outputs.write_steps(out, comparison, columns, job.about)
     if json:
         write(outputs.result_json(comparison, job.about))
@@ -173,6 +181,7 @@ def table(
 ) -> None:
     """Write the control table of an architecture on a cycle, for other solvers."""
     from hevopt import report
+    from hevopt.case import require_nox
     from hevopt.cycle import load_cycle
     from hevopt.powertrain import build_problem
     from hevopt.study_file import cars_of, settings_of
@@ -180,10 +189,13 @@ def table(
     settings = settings_of(_OPTIONS, given)
     car, trace = cars_of(settings, [architecture]).cars[0], load_cycle(cycle)
     check_out(out, architecture, cycle)
+    nox_weight = settings.get("nox_weight", 0.0)
+    if nox_weight > 0:
+        require_nox(car, f"nox_weight {nox_weight:g}")
     problem = build_problem(
         car,
         trace,
-        nox_weight=settings.get("nox_weight", 0.0),
+        nox_weight=nox_weight,
         allow_shortfall=settings.get("allow_shortfall", False),
     )
     report.write_table(out, problem)

@@ -169,6 +169,7 @@ def _front(
     points: int | None = None,
 ) -> tuple[dict[str, Any], int]:
     """The figures of a car's front, and the number of steps driven with less than the cycle asks."""
+    from hevopt.case import require_nox
     from hevopt.pareto import GAP_ENOUGH, POINTS_MAX, figures_of, front
     from hevopt.powertrain import build_problem
     from hevopt.strategies import strategy_named
@@ -176,6 +177,7 @@ def _front(
     chosen = strategy_named(strategy)
     if chosen.learns:
         raise DataError(f"--strategy {strategy} learns from other cycles; choose another, as dp")
+    require_nox(car, "a front of fuel and NOx")
     problem = build_problem(car, trace, allow_shortfall=settings.get("allow_shortfall", False))
     found = front(
         problem,

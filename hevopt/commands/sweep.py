@@ -11,6 +11,7 @@ from hevopt.commands.sweep_view import (
     SweepProgress,
     best_table,
     counted,
+    discarded,
     duration,
     failures,
 )
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 _PARTLY = 4
 _FIRST_CASES = 5
+_NOTHING_TO_PRUNE = (
+    "--prune: each design has a NOx weight of its own, none condemns another: nothing is pruned"
+)
 
 
 def sweep(
@@ -159,11 +163,13 @@ def _run(
         plan = plan_of(contents, prune=prune)
         with open_store(store) as opened:
             begin(plan, opened, command_line())
+            if prune and not plan.prunable:
+                progress.say(_NOTHING_TO_PRUNE)
             others = opened.others()
             if others and not opened.statuses():
                 progress.say(
-                    f"{store} holds {others} results, none of this study as it is now (inputs, hevopt or "
-                    "a library changed): they stay, and everything is run"
+                    f"{store} holds {others} results, none that this study asks for as it is now (inputs, "
+                    "strategies, hevopt or a library changed): they stay, and everything is run"
                 )
             try:
                 with wish.held():
@@ -183,28 +189,37 @@ def _rehearse(
     progress: SweepProgress,
     wish: "Wish",
 ) -> None:
+    from hevopt.sweeps.designs import merged_values
     from hevopt.sweeps.pools import cores
     from hevopt.sweeps.reading import open_to_read
     from hevopt.sweeps.run import Watch, plan_of, timed_sample
     from hevopt.sweeps.study_file import read_study
 
-    plan = plan_of(read_study(study), prune=prune)
+    contents = read_study(study)
+    plan = plan_of(contents, prune=prune)
     keys = {case.key for case in plan.planned}
     done: set[str] = set()
     if store.exists() and store.stat().st_size:
         with open_to_read(store) as reader:
             done = keys & reader.keys()
     _say_plan(plan, len(keys), len(done))
+    for key, (asked, distinct) in merged_values(contents).items():
+        write(
+            f"{printable(key)}: {asked} values asked for, {distinct} once rounded to whole numbers"
+        )
+    if prune and not plan.prunable:
+        write(_NOTHING_TO_PRUNE)
     with wish.held():
         sample = timed_sample(plan, keys - done, execution, Watch(notice=progress.say, stop=wish))
     if sample is None:
         write("nothing is left to run")
         return
     workers = execution.workers or cores()
+    startup_s, total_s = sample.startup_s, sample.total_s
     write(
         f"timed sample: {sample.cases} cases, one after the other, took {duration(sample.seconds)}; estimate: "
-        f"{duration(sample.total_s)} on one worker, {duration(sample.total_s / workers)} on {workers}"
-        + (", less what is pruned" if prune else "")
+        f"{duration(startup_s + total_s)} on one worker, {duration(startup_s + total_s / workers)} on {workers}, "
+        f"{duration(startup_s)} of it to start and compile{', less what is pruned' if prune else ''}"
     )
 
 
@@ -254,11 +269,19 @@ def _say_results(reader: "Reader", done: "Progress") -> None:
     took_s = monotonic() - done.began_s
     pace = f", {done.done / took_s:.3g}/s" if done.done else ""
     write(f"{done.done} cases run in {duration(took_s)}{pace}; {done.failed} of them failed")
+    _say_standing(reader)
+
+
+def _say_standing(reader: "Reader") -> None:
     for line in failures(reader):
         write(line)
-    table = best_table(reader)
+    table, more = best_table(reader)
     if table is not None:
         show(table)
+    if more:
+        write(f"and {more} more NOx weights; --export lists them")
+    for line in discarded(reader):
+        write(line)
 
 
 def _show_status(path: Path) -> None:
@@ -268,11 +291,7 @@ def _show_status(path: Path) -> None:
         meta, counts = reader.meta(), reader.counts()
         write(f"study {printable(meta.get('study_file', 'unknown'))}, begun {meta.get('begun')}")
         write(counted(counts))
-        for line in failures(reader):
-            write(line)
-        table = best_table(reader)
-        if table is not None:
-            show(table)
+        _say_standing(reader)
 
 
 def _export(store: Path, out: Path) -> None:

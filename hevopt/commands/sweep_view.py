@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from hevopt.sweeps.run import Progress
 
 _LINE_EVERY_S = 10.0
-_BEST = 5
+_BEST, _LINES = 5, 20
 _ERRORS_LISTED = 3
+_PRUNED_LISTED = 3
 _ERROR_CHARACTERS = 200
 
 
@@ -93,7 +94,9 @@ def counted(counts: dict[str, int]) -> str:
     listed = ", ".join(f"{counts[name]} {name}" for name in named if counts[name])
     total = sum(counts[name] for name in named)
     other = (
-        f"; {counts['other']} results of other inputs or code are kept" if counts["other"] else ""
+        f"; {counts['other']} more results are kept, of other inputs, strategies or code"
+        if counts["other"]
+        else ""
     )
     return f"{total} cases of {counts['designs']} designs: {listed or 'none'}{other}"
 
@@ -117,8 +120,20 @@ def failures(reader: "Reader") -> list[str]:
     return [*lines, f"and {more} more kinds of failure; --export lists them"] if more > 0 else lines
 
 
-def best_table(reader: "Reader") -> "Table | None":
-    """The best designs with their objective and bound; None where nothing is solved."""
+def discarded(reader: "Reader") -> list[str]:
+    """The first pruned designs, each with its bound and what condemned it."""
+    found = reader.pruned()
+    lines = [
+        f"design {p.design} pruned: its bound, {p.bound:.4f} l/100km, is above the objective of design "
+        f"{p.incumbent}, {p.objective:.4f}"
+        for p in found[:_PRUNED_LISTED]
+    ]
+    more = len(found) - _PRUNED_LISTED
+    return [*lines, f"and {more} more designs pruned; --export lists them"] if more > 0 else lines
+
+
+def best_table(reader: "Reader") -> "tuple[Table | None, int]":
+    """The best designs with their objective and bound, None without any; how many NOx weights are left out."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -126,10 +141,11 @@ def best_table(reader: "Reader") -> "Table | None":
     from hevopt.sweeps.ranking import best_designs
 
     best = best_designs(reader, _BEST)
-    each = max(1, _BEST // max(1, len(best)))
-    ranked = [design for designs in best.values() for design in designs[:each]]
+    each = _BEST if _BEST * len(best) <= _LINES else 1
+    ranked = [design for designs in best.values() for design in designs[:each]][:_LINES]
     if not ranked:
-        return None
+        return None, 0
+    short = not all(design.follows for design in ranked)
     table = Table(
         box=box.SIMPLE_HEAD, title=Text("best designs" if len(best) < 2 else "best designs of each NOx weight"),
         title_justify="left", collapse_padding=True, pad_edge=False,
@@ -139,9 +155,12 @@ def best_table(reader: "Reader") -> "Table | None":
         table.add_column(Text(printable(name)), justify="right")
     for head in ("objective\nl/100km", "bound\nl/100km", "gap\n%"):
         table.add_column(head, justify="right", no_wrap=True)
+    if short:
+        table.add_column("cycle")
     for design in ranked:
-        table.add_row(*map(Text, _cells(design)))
-    return table
+        mark = ["" if design.follows else "not followed"] if short else []
+        table.add_row(*map(Text, _cells(design) + mark))
+    return table, max(0, len(best) - _LINES)
 
 
 def _cells(ranked: "Ranked") -> list[str]:

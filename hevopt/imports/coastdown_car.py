@@ -35,7 +35,10 @@ def car_base(like: str | None, given: Mapping[str, Any], rotating_kg: float | No
         if key not in allowed or (key != "name" and not (number and value >= 0)):
             raise DataError(f"{key} = {value!r}; allowed: {', '.join(allowed)}, numbers from 0 up")
     contents: dict[str, Any] = {"name": "car from coast-down"}
-    origins = {"mass_kg": "as tested, given"}
+    origins = {
+        "mass_kg": "as tested, given; without hybrid parts",
+        "road_load.coastdown_mass_kg": "as tested, given; C0 grows with the car's mass over it",
+    }
     if like is not None:
         car = read_toml(find("architectures/components", like, ".toml"), CarFile)
         contents |= {key: getattr(car, key) for key in _LIKE_KEYS}
@@ -86,6 +89,17 @@ def car_contents(fit: RoadLoad, base: CarBase, mass_kg: float) -> dict[str, Any]
         )
     names = ("coastdown_c0_n", "coastdown_c1_nspm", "coastdown_c2_ns2pm2")
     load = {name: float(value) for name, value in zip(names, fit.coefficients, strict=True)}
+    load["coastdown_mass_kg"] = mass_kg
     contents = {**base.contents, "mass_kg": mass_kg, "road_load": load}
     checked("car from coast-down", contents, CarFile)
     return contents
+
+
+def said_of_mass(mass_kg: float) -> list[str]:
+    """Lines of text: what the mass of the test stands for in the car file."""
+    return [
+        f"mass_kg: {mass_kg:g} kg as tested becomes the car's mass without hybrid parts; an architecture's "
+        "hybrid_mass_kg comes on top",
+        f"coastdown_mass_kg: {mass_kg:g} kg; C0 is taken as rolling resistance and scales with the car's mass over "
+        "it, C1 and C2 stay",
+    ]

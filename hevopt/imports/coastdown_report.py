@@ -11,6 +11,9 @@ _UNITS = ("N", "N/(m/s)", "N/(m/s)²")
 _WIDE = 0.25
 _FEW_RUNS = 6
 _FAR_RUN = 0.1
+# Intervals below this share of a value have no digits of their own; measured runs never agree so well.
+_FINEST = 1e-4
+_TINY = 1e-9
 
 
 def results(runs: Sequence[Run], fit: RoadLoad, mass_kg: float, rotating_kg: float) -> list[str]:
@@ -25,14 +28,15 @@ def results(runs: Sequence[Run], fit: RoadLoad, mass_kg: float, rotating_kg: flo
     for name, value, width, unit in zip(
         ("C0", "C1", "C2"), fit.coefficients, half, _UNITS, strict=True
     ):
-        places = max(0, 1 - int(np.floor(np.log10(max(width, 1e-12)))))
-        said.append(f"  {name} = {value:9.{places}f} ± {width:.{places}f} {unit}")
+        known = max(width, abs(value) * _FINEST, _TINY)
+        places = max(0, 1 - int(np.floor(np.log10(known))))
+        said.append(f"  {name} = {value:9.{places}f} ± {_width(width, places)} {unit}")
     low, high = _range_mps(runs)
     speeds = np.arange(20.0, 300.0, 20.0) / KMH_PER_MPS
     speeds = speeds[(speeds >= low) & (speeds <= high)]
     force, width = fit.force_n(speeds)
     said += [
-        f"  at {v * KMH_PER_MPS:3.0f} km/h: {f:7.1f} ± {w:.1f} N"
+        f"  at {v * KMH_PER_MPS:3.0f} km/h: {f:7.1f} ± {_width(w, 1)} N"
         for v, f, w in zip(speeds, force, width, strict=True)
     ]
     grade = fit.slope_n / (mass_kg * STANDARD_GRAVITY_MPS2)
@@ -46,6 +50,12 @@ def results(runs: Sequence[Run], fit: RoadLoad, mass_kg: float, rotating_kg: flo
     )
     said.append(f"mean force of each run beyond the fit, N: {offsets}")
     return said + [f"WARNING: {doubt}" for doubt in _doubts(runs, fit)]
+
+
+def _width(width: float, places: int) -> str:
+    """Half an interval with that many decimals, never as 0."""
+    unit = 10.0**-places
+    return f"{width:.{places}f}" if width >= unit / 2 else f"<{unit:.{places}f}"
 
 
 def _range_mps(runs: Sequence[Run]) -> tuple[float, float]:
@@ -71,7 +81,12 @@ def _doubts(runs: Sequence[Run], fit: RoadLoad) -> list[str]:
             "known better, see above; do not use it outside, or add runs over a wider range"
         )
     middle = np.array([(low + high) / 2 / KMH_PER_MPS])
-    force = fit.force_n(middle)[0][0]
+    force, width = (values[0] for values in fit.force_n(middle))
+    if width < _FINEST * force:
+        doubts.append(
+            "the runs of a direction agree better than measured ones can; copies, or computed? the intervals then "
+            "say nothing"
+        )
     for run, off in zip(runs, fit.offset_n, strict=True):
         if abs(off) > _FAR_RUN * force:
             doubts.append(

@@ -1,19 +1,20 @@
 """Coast-down runs from measured tables, with what makes a run useless: rising speed, brakes, gaps in the data.
 
 A new run begins where the run's number or the direction changes, in a new file, and, without such a number, where
-the time goes back.
+the time goes back or has a gap.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
+from hevopt.files import printable
 from hevopt.imports.coastdown import Run
-from hevopt.imports.measured import Measured, column_named, column_of, in_si, read_measured
+from hevopt.imports.measured import Column, Measured, column_named, column_of, in_si, read_measured
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,16 @@ _RISE_MIN_MPS = 0.3
 _BRAKE_MIN_MPS2 = 0.3
 _OUTLIER = 8.0
 _NORMAL_PER_MAD = 1.4826
+# Without a column run: a longer gap in time, in seconds and in usual steps, parts two runs.
+_GAP_S = 5.0
+_GAP_STEPS = 10.0
+_LISTED = 20
+# No two measured runs agree so closely in every sample; a copy written with fewer digits does.
+_COPY_S, _COPY_MPS = 1e-3, 1e-3
+_SEPARATE = (
+    "runs are told apart by a column run with a number for each, by a file for each, or by a gap in time of more "
+    f"than {_GAP_S:g} s and {_GAP_STEPS:g} usual steps; cut what lies between them from the log"
+)
 
 
 def read_runs(
@@ -48,20 +59,22 @@ def read_runs(
         found, said = _parts(path, columns, units, sheet)
         parts += found
         notes += [f"{path.name}: {note}" for note in said]
-    labels = _directions(parts, directions)
+    labels, said = _directions(parts, directions)
+    notes += said
     runs = [
         Run(str(k + 1), direction, time, speed, place)
         for k, ((time, speed, place, _), direction) in enumerate(zip(parts, labels, strict=True))
     ]
     for run in runs:
         _check_run(run)
+    _check_copies(runs)
     _check_brakes(runs)
     return runs, notes
 
 
 def _parts(path: Path, columns: Mapping[str, str], units: Mapping[str, str], sheet: str | None):
     measured = read_measured(path, sheet=sheet)
-    values, notes = {}, list(measured.notes)
+    values, words, notes = {}, [], list(measured.notes)
     for role, aliases in _ALIASES.items():
         named = columns.get(role)
         column = (
@@ -83,10 +96,21 @@ def _parts(path: Path, columns: Mapping[str, str], units: Mapping[str, str], she
             values[role], note = found.values, found.note
         else:
             values[role], note = column.values, f"column {column.name}"
+        if role == "direction" and column.words:
+            values[role], words = _coded(column)
         notes.append(f"{role}: {note}")
         _check_numbers(measured, role, values[role])
     time = values["time"]
-    begins = (np.diff(time) < 0) & ("run" not in values)
+    begins = np.zeros(max(len(time) - 1, 0), dtype=bool)
+    if "run" not in values:
+        gaps = _gaps(time)
+        begins = gaps | (np.diff(time) < 0)
+        if gaps.any():
+            after = measured.lines[1:][gaps]
+            more = f" and {len(after) - _LISTED} more" * (len(after) > _LISTED)
+            notes.append(
+                f"a gap in time begins a new run in line {', '.join(map(str, after[:_LISTED]))}{more}"
+            )
     for role in ("run", "direction"):
         if role in values:
             begins |= np.diff(values[role]) != 0
@@ -96,11 +120,32 @@ def _parts(path: Path, columns: Mapping[str, str], units: Mapping[str, str], she
             time[a:b],
             values["speed"][a:b],
             f"{measured.path}, lines {measured.lines[a]} to {measured.lines[b - 1]}",
-            values["direction"][a] if "direction" in values else None,
+            _way(values["direction"][a], words) if "direction" in values else None,
         )
         for a, b in pairwise(edges)
     ]
     return parts, notes
+
+
+def _coded(column: Column) -> tuple[Array, list[str]]:
+    """(row,) the number of each row's text, NaN for others, and the texts; capitals do not matter."""
+    codes, words = np.full(len(column.values), np.nan), {}
+    for text, rows in column.words.items():
+        word = words.setdefault(text.casefold(), (len(words), text))
+        codes[np.asarray(rows)] = word[0]
+    return codes, [text for _, text in words.values()]
+
+
+def _way(value: float, words: list[str]) -> float | str:
+    return words[int(value)] if words else float(value)
+
+
+def _gaps(time: Array) -> NDArray[np.bool_]:
+    """(row - 1,) whether a step is so long that it parts two runs."""
+    steps = np.diff(time)
+    forward = steps[steps > 0]
+    usual = float(np.median(forward)) if len(forward) else 0.0
+    return steps > max(_GAP_S, _GAP_STEPS * usual)
 
 
 def _check_numbers(measured: Measured, role: str, values: Array) -> None:
@@ -109,15 +154,19 @@ def _check_numbers(measured: Measured, role: str, values: Array) -> None:
         bad |= values < 0
     if bad.any():
         k = int(np.flatnonzero(bad)[0])
-        hint = "; a direction is a number such as 1 and -1" if role == "direction" else ""
+        fault = {
+            "speed": "is missing, negative or no number",
+            "direction": "is missing, or not one of two numbers or two texts",
+        }.get(role, "is missing or no number")
+        allowed = "; allowed: 1 and -1, or two texts such as N and S" * (role == "direction")
         raise DataError(
-            f"{measured.path}, line {measured.lines[k]}: {role} is missing, negative or no number ({bad.sum()} "
-            f"such rows){hint}; correct or delete the rows"
+            f"{measured.path}, line {measured.lines[k]}: {role} {fault} ({bad.sum()} such rows){allowed}; correct "
+            "or delete the rows"
         )
 
 
-def _directions(parts: list, given: Sequence[int] | None) -> list[int]:
-    """+1 and -1 of every run; +1 is the direction of the first."""
+def _directions(parts: list, given: Sequence[int] | None) -> tuple[list[int], list[str]]:
+    """+1 and -1 of every run, and which is which where a column names them otherwise: +1 is the first met."""
     raw = [direction for *_, direction in parts]
     if given is not None:
         if raw != [None] * len(parts):
@@ -128,21 +177,34 @@ def _directions(parts: list, given: Sequence[int] | None) -> list[int]:
             raise DataError(
                 f"--directions names {len(given)} runs, the files hold {len(parts)}: "
                 + "; ".join(place for _, _, place, _ in parts[:6])
+                + f"; {_SEPARATE}"
             )
-        return list(given)
+        return list(given), []
     if None in raw:
         raise DataError(
-            f"no column of direction for the {len(parts)} runs found; add one (1 and -1), name it with --column "
-            "direction=NAME, or give --directions +,-,+,- in the order of the runs"
+            f"no column of direction for the {len(parts)} run{'s' * (len(parts) > 1)} found; add one (1 and -1), "
+            "name it with --column direction=NAME, or give --directions +,-,+,- in the order of the runs; "
+            f"{_SEPARATE}"
         )
+    spelled: dict[str, str] = {}
+    raw = [spelled.setdefault(d.casefold(), d) if isinstance(d, str) else d for d in raw]
     kinds = list(dict.fromkeys(raw))
+    names = [printable(k) if isinstance(k, str) else f"{k:g}" for k in kinds]
+    if len({type(kind) for kind in kinds}) > 1:
+        raise DataError(
+            f"the files name directions by numbers and by texts ({', '.join(names[:5])}); write the same two for "
+            "both"
+        )
     if len(kinds) != 2:
-        listed = ", ".join(f"{kind:g}" for kind in kinds[:5])
+        listed = ", ".join(names[:5])
         raise DataError(
             f"{len(kinds)} direction{'s' if len(kinds) > 1 else ''} found ({listed}); needed: runs in two opposite "
             "directions, since slope and wind cancel between them; add runs the other way"
         )
-    return [1 if direction == kinds[0] else -1 for direction in raw]
+    if set(kinds) == {1.0, -1.0}:
+        return [int(direction) for direction in raw], []
+    note = f"direction: {names[0]} counts as +1, {names[1]} as -1"
+    return [1 if direction == kinds[0] else -1 for direction in raw], [note]
 
 
 def _check_run(run: Run) -> None:
@@ -166,7 +228,7 @@ def _check_run(run: Run) -> None:
         k = int(np.argmax(rises))
         raise DataError(
             f"{run.place}: run {run.label}: speed rises by {rises[k] * 3.6:.1f} km/h after t = {starts[k]:g} s; a "
-            "coast-down only slows down: cut the file to its coasting parts, and mark them with a column run"
+            f"coast-down only slows down: cut the file to its coasting parts; {_SEPARATE}"
         )
     fall = means[0] - means[-1]
     if fall < _FALL_MIN_MPS:
@@ -174,6 +236,20 @@ def _check_run(run: Run) -> None:
             f"{run.place}: run {run.label} falls by {fall * 3.6:.1f} km/h only; needed: "
             f"{_FALL_MIN_MPS * 3.6:.0f} km/h or more to tell C0, C1 and C2 apart"
         )
+
+
+def _check_copies(runs: list[Run]) -> None:
+    """DataError where two runs are one: they would make the intervals too narrow."""
+    for one, other in combinations(runs, 2):
+        if len(one.time_s) != len(other.time_s):
+            continue
+        times = (one.time_s - one.time_s[0]) - (other.time_s - other.time_s[0])
+        speeds = one.speed_mps - other.speed_mps
+        if np.abs(times).max() < _COPY_S and np.abs(speeds).max() < _COPY_MPS:
+            raise DataError(
+                f"runs {one.label} ({one.place}) and {other.label} ({other.place}) are the same recording; the "
+                "intervals come from how runs differ: give every run once"
+            )
 
 
 def _blocks(run: Run) -> tuple[Array, Array, Array]:

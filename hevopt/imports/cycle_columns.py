@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError, unknown_name
+from hevopt.files import shown
 from hevopt.imports.measured import (
     Column,
     Measured,
@@ -15,6 +16,7 @@ from hevopt.imports.measured import (
     columns_found,
     in_si,
 )
+from hevopt.imports.measured_names import grade_ends_step
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,9 @@ _QUANTITIES = {
     "grade": ("fraction", "angle"),
     "altitude": ("length",),
 }
+_READ_AS = {
+    "time": "a time that can be read (seconds, 10:00:01 with hours, minutes and seconds, or 2024-02-01 10:00:01)"
+}
 _OPTIONS = {"time": "--time-unit", "speed": "--speed-unit"}
 
 
@@ -58,6 +63,7 @@ class Drive:
 
     time_s is None for a drive over distance_m; what the file lacks is None. notes: one text per assumption
     text: (role, row) -> cell that is no number
+    grade_ends: whether a row's grade holds over the step that ends at the row, not the one that begins there
     """
 
     measured: Measured
@@ -72,6 +78,7 @@ class Drive:
     clutch_open: Array | None
     notes: tuple[str, ...]
     text: dict[tuple[str, int], str]
+    grade_ends: bool
 
 
 def drive_of(measured: Measured, columns: Mapping[str, str], units: Mapping[str, str]) -> Drive:
@@ -117,8 +124,14 @@ def drive_of(measured: Measured, columns: Mapping[str, str], units: Mapping[str,
     return Drive(
         measured, measured.lines, values["speed"], values["time"], values["distance"],
         values["stop"], values["grade"], values["altitude"], values["gear"], values["clutch_open"],
-        tuple(notes), text,
+        tuple(notes), text, _grade_ends(measured, chosen),
     )  # fmt: skip
+
+
+def _grade_ends(measured: Measured, chosen: Mapping[str, Column | None]) -> bool:
+    if chosen["grade"] is None or chosen["time"] is None:
+        return False
+    return grade_ends_step(chosen["grade"].name, [column.name for column in measured.columns])
 
 
 def _chosen(measured: Measured, role: str, columns: Mapping[str, str]) -> Column | None:
@@ -144,6 +157,13 @@ def _values(
     """A column's values in SI, with a note of where its unit comes from."""
     if column is None:
         return None
+    if column.strange and not np.isfinite(column.values).any():
+        row, cell = column.strange[0]
+        raise DataError(
+            f"{measured.path}, line {measured.lines[row]}: column {column.name}: {shown(cell)} is not "
+            f"{_READ_AS.get(role, 'a number')}, nor is any other cell; correct the column, or choose another with "
+            f"--column {role}=NAME; {columns_found(measured)}"
+        )
     if role not in _QUANTITIES:
         if unit is not None:
             raise DataError(f"{measured.path}: {role} has no unit; leave out --unit {role}={unit}")

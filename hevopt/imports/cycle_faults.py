@@ -1,23 +1,19 @@
 """What is wrong with a logged drive, line by line, and the repairs that a user may ask for.
 
 A speed may change by the friction of tyres on a dry road times the time between two samples, and by the sensor's
-smallest step, up to 1 km/h; what changes faster is a spike. A gap is more than ten usual steps without a sample,
-and more than 2 s.
+smallest step, up to 1 km/h; what changes faster is a spike.
 """
 
-from bisect import bisect_left
-from collections import Counter
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.cycle import GRADE_MAX, SPEED_MAX_MPS
 from hevopt.errors import DataError
-from hevopt.files import shown
 from hevopt.imports.cycle_columns import Drive
-from hevopt.imports.measured_cells import LISTED
+from hevopt.imports.cycle_fault_list import Faults, empty_cell, refused
+from hevopt.imports.cycle_times import past_midnight, report_gaps, times_in_order
 from hevopt.units import KMH_PER_MPS, STANDARD_GRAVITY_MPS2
 
 Array = NDArray[np.float64]
@@ -27,27 +23,9 @@ ACCELERATION_MAX_MPS2 = TYRE_FRICTION * STANDARD_GRAVITY_MPS2
 # A car that is slower rests.
 SMALLEST_MPS = 1e-3
 _RESOLUTION_MAX_MPS = 1.0001 / KMH_PER_MPS
-_GAP_STEPS, _GAP_MIN_S = 10.0, 2.0
 _GEAR_MAX = 20
 # A file with more to repair than this share of its lines is not a log with a few faults.
 _REPAIRED_SHARE_MAX = 0.25
-_SAME_TIME_S = 1e-6
-
-
-@dataclass(slots=True)
-class Faults:
-    """Faults or repairs as they are found: (line, kind, text, what the text is filled with)."""
-
-    found: list[tuple[int, str, str, tuple]] = field(default_factory=list)
-
-    def add(self, line: int, kind: str, text: str, *values: object) -> None:
-        """One fault; its text is filled in only where it is shown, for there may be a million."""
-        self.found.append((int(line), kind, text, values))
-
-    def texts(self, count: int | None = None) -> list[str]:
-        """`line 12: ...` of the first faults, or of all, in the order of lines."""
-        ordered = sorted(self.found, key=lambda fault: fault[0])
-        return [f"line {line}: {text.format(*values)}" for line, _, text, values in ordered[:count]]
 
 
 def sound(drive: Drive, repair: bool) -> tuple[Drive, list[str]]:
@@ -73,20 +51,14 @@ def sound(drive: Drive, repair: bool) -> tuple[Drive, list[str]]:
     return mended, faults.texts()
 
 
-def refused(path: Path, faults: Faults, advice: str) -> DataError:
-    """The error that lists the faults by line, counts them by kind and says what to do."""
-    kinds = Counter(fault[1] for fault in faults.found)
-    counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-    total = len(faults.found)
-    more = [f"and {total - LISTED} more"] if total > LISTED else []
-    body = "\n  ".join(faults.texts(LISTED) + more)
-    return DataError(f"{path}: {total} fault{'s' * (total > 1)} ({counts})\n  {body}\n{advice}")
-
-
 def _repaired(drive: Drive, faults: Faults) -> Drive:
-    """The drive after: lines with a time out of order left out, speeds below 0 set to 0, missing speeds and spikes
-    drawn straight between their neighbours, gaps too; other columns hold their last value."""
-    kept = _times_in_order(drive, faults)
+    """The drive after the repairs.
+
+    A clock that passes midnight runs on; lines with a time out of order are left out; speeds below 0 are set to 0,
+    missing ones, spikes and gaps drawn straight between their neighbours; other columns hold their last value.
+    """
+    drive = past_midnight(drive, faults)
+    kept = times_in_order(drive, faults)
     if kept.sum() < 2:
         faults.add(
             drive.lines[-1], "ends", "the drive ends with {} lines of a time in order", kept.sum()
@@ -95,7 +67,7 @@ def _repaired(drive: Drive, faults: Faults) -> Drive:
             drive.measured.path, faults, "a drive needs at least 2; check the column of time"
         )
     drive = _rows_of(drive, kept)
-    _report_gaps(drive, faults)
+    report_gaps(drive, faults)
     speed_mps = _speeds(drive, faults)
     return replace(drive, speed_mps=speed_mps, **held_columns(drive, faults))
 
@@ -118,75 +90,13 @@ def _rows_of(drive: Drive, kept: NDArray[np.bool_]) -> Drive:
     return replace(drive, text=text, **part)
 
 
-def _times_in_order(drive: Drive, faults: Faults) -> NDArray[np.bool_]:
-    """(row,) rows of the longest series of times that increase; the others are faults."""
-    time_s, lines = drive.time_s, drive.lines
-    known = np.flatnonzero(np.isfinite(time_s))
-    for row in np.flatnonzero(~np.isfinite(time_s)):
-        what = _empty(drive, "time", row)
-        faults.add(lines[row], "without a time", "time {}; the line is left out", what)
-    kept = np.zeros(len(time_s), dtype=bool)
-    kept[known] = True
-    if (np.diff(time_s[known]) > _SAME_TIME_S).all():
-        return kept
-    series = known[_longest_increasing(time_s[known])]
-    kept[:] = False
-    kept[series] = True
-    for row in np.flatnonzero(np.isfinite(time_s) & ~kept):
-        before = series[max(np.searchsorted(series, row) - 1, 0)]
-        same = abs(time_s[row] - time_s[before]) <= _SAME_TIME_S
-        kind, how = (
-            ("duplicate times", "stands twice")
-            if same
-            else ("times out of order", "is out of order")
-        )
-        faults.add(
-            lines[row], kind, "time {:g} s {} (line {}: {:g} s); the line is left out",
-            time_s[row], how, lines[before], time_s[before],
-        )  # fmt: skip
-    return kept
-
-
-def _longest_increasing(values: Array) -> list[int]:
-    """Indices of the longest strictly increasing series, of equal ones the first."""
-    ends: list[float] = []
-    last: list[int] = []
-    before = [-1] * len(values)
-    for i, value in enumerate(values.tolist()):
-        place = bisect_left(ends, value - _SAME_TIME_S)
-        before[i] = last[place - 1] if place else -1
-        if place == len(ends):
-            ends.append(value)
-            last.append(i)
-        elif value < ends[place]:  # of equal values the first one stays
-            ends[place], last[place] = value, i
-    series, i = [], last[-1]
-    while i >= 0:
-        series.append(i)
-        i = before[i]
-    return series[::-1]
-
-
-def _report_gaps(drive: Drive, faults: Faults) -> None:
-    steps_s = np.diff(drive.time_s)
-    limit_s = max(_GAP_MIN_S, _GAP_STEPS * float(np.median(steps_s)))
-    for row in np.flatnonzero(steps_s > limit_s):
-        faults.add(
-            drive.lines[row + 1], "gaps",
-            "{:g} s without a sample before {:g} s (limit {:g} s); the speed is drawn straight across",
-            steps_s[row], drive.time_s[row + 1], limit_s,
-        )  # fmt: skip
-
-
 def _speeds(drive: Drive, faults: Faults) -> Array:
     speed, lines = drive.speed_mps.copy(), drive.lines
     for row in np.flatnonzero(~np.isfinite(speed)):
-        what = _empty(drive, "speed", row)
+        what = empty_cell(drive, "speed", row)
         faults.add(lines[row], "without a speed", "speed {}; drawn between its neighbours", what)
-    for row in np.flatnonzero(speed < 0):
-        text = "speed {:.4g} km/h is negative; set to 0"
-        faults.add(lines[row], "negative speeds", text, speed[row] * KMH_PER_MPS)
-    speed = np.where(speed < 0, 0.0, speed)
+    negative = speed < 0
+    speed = np.where(negative, 0.0, speed)
     kept = np.isfinite(speed)
     for row in np.flatnonzero(speed > SPEED_MAX_MPS):
         text = "speed {:.4g} km/h is above {:g} km/h; drawn between its neighbours"
@@ -199,6 +109,8 @@ def _speeds(drive: Drive, faults: Faults) -> Array:
     kept &= ~(speed > SPEED_MAX_MPS)
     for row, other in _spikes(drive.time_s, speed, np.flatnonzero(kept)):
         kept[row] = False
+        if negative[row]:
+            continue
         step_s = abs(drive.time_s[row] - drive.time_s[other])
         faults.add(
             lines[row], "spikes",
@@ -207,6 +119,12 @@ def _speeds(drive: Drive, faults: Faults) -> Array:
             speed[row] * KMH_PER_MPS, speed[other] * KMH_PER_MPS, lines[other], step_s,
             abs(speed[row] - speed[other]) / step_s, ACCELERATION_MAX_MPS2,
         )  # fmt: skip
+    for row in np.flatnonzero(negative):
+        how = (
+            "set to 0" if kept[row] else "drawn between its neighbours, against which 0 is a spike"
+        )
+        text = "speed {:.4g} km/h is negative; {}"
+        faults.add(lines[row], "negative speeds", text, drive.speed_mps[row] * KMH_PER_MPS, how)
     return np.interp(drive.time_s, drive.time_s[kept], speed[kept]) if kept.any() else speed
 
 
@@ -257,13 +175,8 @@ def _held(drive: Drive, name: str, faults: Faults) -> Array | None:
     wanted = f"{'a whole number ' if whole else ''}from {low:g} to {high:g}"
     for row in np.flatnonzero(~good):
         known = np.isfinite(values[row])
-        what = f"is {values[row]:g}, not {wanted}" if known else _empty(drive, word, row)
+        what = f"is {values[row]:g}, not {wanted}" if known else empty_cell(drive, word, row)
         place = "before" if rows[row] >= 0 else "after"
         text = "{} {}; {:g} of the line {} is used"
         faults.add(drive.lines[row], f"faults of {word}", text, word, what, held[row], place)
     return held
-
-
-def _empty(drive: Drive, role: str, row: int) -> str:
-    cell = drive.text.get((role, int(row)))
-    return "is empty" if cell is None else f"is {shown(cell)}, no usable number"

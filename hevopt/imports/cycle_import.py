@@ -15,6 +15,7 @@ from hevopt.files import printable
 from hevopt.imports.cycle_columns import Drive, drive_of
 from hevopt.imports.cycle_distance import over_time
 from hevopt.imports.cycle_faults import sound
+from hevopt.imports.cycle_times import long_steps
 from hevopt.imports.measured import read_measured
 from hevopt.imports.resample import (
     distance_at,
@@ -41,7 +42,7 @@ class Imported:
     """A cycle made from a file, with texts for the user.
 
     text: the cycle file; assumptions: how the file was read; rules: how the cycle was made; repairs: by line
-    distance_m: as the source has it, between samples at uneven times
+    distance_m: as the source has it after the repairs, between samples at uneven times
     """
 
     source: Path
@@ -70,12 +71,14 @@ def import_cycle(
     measured = read_measured(path, sheet=sheet)
     drive = drive_of(measured, columns or {}, units or {})
     if drive.time_s is None:
-        drive, repairs = over_time(drive, acceleration_mps2), []
+        drive, repairs, long = over_time(drive, acceleration_mps2), [], []
     elif acceleration_mps2 is not None:
         raise DataError(f"{measured.path}: a drive over time; leave --acceleration out")
     else:
         drive, repairs = sound(drive, repair)
+        long = long_steps(drive)
     sampled, rules = _at_one_hertz(drive)
+    rules += long
     assumptions = (*measured.notes, *drive.notes)
     told = [*(f"read as: {text}" for text in assumptions), *(f"made by: {text}" for text in rules)]
     text = _text(path, measured.path, told, repairs, sampled)
@@ -95,10 +98,11 @@ def summary(imported: Imported) -> list[tuple[str, str]]:
     acceleration = np.diff(speed) / step_s
     up, down = max(acceleration.max(), 0.0), abs(min(acceleration.min(), 0.0))
     change = round(cycle.distance_m / imported.distance_m - 1, 6) + 0.0
+    whose = "repaired drive's" if imported.repairs else "file's"
     rows = [
         ("samples", f"{len(speed)}"),
         ("duration", f"{cycle.duration_s:.10g} s"),
-        ("distance", f"{cycle.distance_m / 1e3:.4f} km ({change:+.4%} of the file's)"),
+        ("distance", f"{cycle.distance_m / 1e3:.4f} km ({change:+.4%} of the {whose})"),
         ("max speed", f"{speed.max() * KMH_PER_MPS:.1f} km/h"),
         ("max acceleration", f"{up:.2f} m/s², braking {down:.2f} m/s²"),
         ("stops", f"{stops}"),
@@ -144,9 +148,16 @@ def _at_one_hertz(drive: Drive) -> tuple[dict[str, Array], list[str]]:
     if drive.altitude_m is not None:
         grade = grades_from_altitude(_distance(drive), drive.altitude_m)
         rules.append("grade from altitude, between points at least 20 m apart")
+    elif drive.grade_ends:
+        grade = np.append(grade[1:], grade[-1])
     if grade is not None:
         columns["grade"] = mean_grades(time_s, drive.speed_mps, grade, at_s)
-        rules.append("grade: each row's holds to the next; mean over the distance of each second")
+        holds = (
+            "over the step that ends at it (FASTSim convention)"
+            if drive.grade_ends
+            else "to the next"
+        )
+        rules.append(f"grade: each row's holds {holds}; mean over the distance of each second")
     return columns, rules
 
 

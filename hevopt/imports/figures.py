@@ -1,15 +1,17 @@
-"""Plots as PNG bytes: what a map covers, and a coast-down with its fit. Same data, same bytes."""
+"""Plots as bytes of a file: what a map covers, and a coast-down with its fit. Same data, same bytes."""
 
 from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from hevopt.engine_file import EngineFile
 from hevopt.imports.coastdown import RoadLoad, Run
+from hevopt.imports.map_gaps import WIDE, lowest_fired_nm, widest_gap
 from hevopt.imports.map_import import Imported
-from hevopt.imports.map_report import envelope_of
+from hevopt.imports.map_report import Envelope, envelope_of
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
 if TYPE_CHECKING:
@@ -37,11 +39,31 @@ def map_figure(imported: Imported) -> bytes:
     high, low = ("full load", "motoring") if isinstance(file, EngineFile) else ("limit", None)
     axes.plot(envelope.speed_radps * RPM_PER_RADPS, envelope.high_nm, "k-", label=high)
     axes.plot(envelope.speed_radps * RPM_PER_RADPS, envelope.low_nm, "k--", label=low)
+    _doubts(axes, imported, envelope)
     axes.set(
         xlabel="speed, rpm", ylabel="torque, Nm", title=_plain(f"{file.name}: what the map covers")
     )
     axes.legend(loc="upper right")
     return _png(figure)
+
+
+def _doubts(axes: "Axes", imported: Imported, envelope: Envelope) -> None:
+    """Hatches where an engine's flow is assumed, and a ring around a wide gap between points."""
+    if isinstance(imported.file, EngineFile):
+        lowest = lowest_fired_nm(imported.lines, envelope.speed_radps)
+        axes.fill_between(
+            envelope.speed_radps * RPM_PER_RADPS, envelope.low_nm, np.minimum(lowest, envelope.high_nm),
+            where=lowest > envelope.low_nm, facecolor="none", edgecolor="#b00020", hatch="///", linewidth=0,
+            label="assumed, not measured",
+        )  # fmt: skip
+    gap = widest_gap(imported.lines)
+    if gap is not None and gap.times > WIDE:
+        turn = np.linspace(0, 2 * np.pi, 100)
+        axes.plot(
+            (gap.speed_radps + gap.reach[0] * np.cos(turn)) * RPM_PER_RADPS,
+            gap.torque_nm + gap.reach[1] * np.sin(turn),
+            "-", color="#b00020", label="wide gap between points",
+        )  # fmt: skip
 
 
 def _efficiency_contours(axes: "Axes", imported: Imported) -> None:
@@ -68,8 +90,8 @@ def _efficiency_contours(axes: "Axes", imported: Imported) -> None:
     axes.clabel(contours, fmt=lambda value: f"{value:.0%}", fontsize=8)
 
 
-def coastdown_figure(runs: list[Run], fit: RoadLoad) -> bytes:
-    """Speeds with the fit, what is left, and the resistance with its 95 % band."""
+def coastdown_figure(runs: list[Run], fit: RoadLoad, kind: str) -> bytes:
+    """Speeds with the fit, what is left, and the resistance with its 95 % band; kind: "png", "svg" or "pdf"."""
     figure = Figure(figsize=(9, 10), layout="constrained")
     speeds, residuals, force = figure.subplots(3, 1, height_ratios=(2, 1, 2))
     said: set[int] = set()
@@ -97,12 +119,21 @@ def coastdown_figure(runs: list[Run], fit: RoadLoad) -> bytes:
     force.set(xlabel="speed, km/h", ylabel="resistance, N")
     for axes in (speeds, force):
         axes.legend()
-    return _png(figure)
+    return _png(figure) if kind == "png" else _vectors(figure, kind)
 
 
 def _plain(text: str) -> str:
     """Text without what matplotlib takes for a formula."""
     return text.replace("$", r"\$")
+
+
+def _vectors(figure: Figure, kind: str) -> bytes:
+    """An SVG or PDF, without its date and with names of parts that do not depend on chance."""
+    out = BytesIO()
+    with rc_context({"svg.hashsalt": "hevopt"}):
+        date = {"svg": "Date", "pdf": "CreationDate"}[kind]
+        figure.savefig(out, format=kind, metadata={date: None})
+    return out.getvalue()
 
 
 def _png(figure: Figure) -> bytes:

@@ -1,7 +1,7 @@
 """Full-load and motoring curve of a measured engine, and a flow on its grid from one to the other.
 
-The motoring curve counts as measured points of no fuel: below it the fuel is cut, between it and the lowest
-measured torque the flow is linear.
+Below the motoring curve the fuel is cut; between it and the lowest measured torque the flow is assumed to be
+linear.
 """
 
 from dataclasses import replace
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _PA_PER_BAR = 1e5
 _SAMPLES = 21
+_MOTORING_POINTS = 21
 _ROUNDING = 1e-6
 
 
@@ -109,8 +110,11 @@ def check_idle(idle_rpm: float, full: Curve) -> None:
         )
 
 
-def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> Grid:
-    """The grid of a flow from the motoring curve, where and below which it is 0, up to the full-load curve."""
+def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> tuple[Grid, int]:
+    """The grid of a flow from the motoring curve, where and below which it is 0, up to the full-load curve.
+
+    Second, at how many of its speeds measured rows were continued up to that curve.
+    """
     speed, torque = axes.speed_radps, axes.torque_nm
     drag = on_speeds(motoring, speed)
     axis = torque_axis(min(drag.min(), torque[0]), torque[-1])
@@ -124,7 +128,7 @@ def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> Grid:
     else:
         values = on_axes(_and_motoring(lines, motoring), speed, axis).values
     grid = Grid(speed, axis, np.where(axis <= drag[:, None], 0.0, values))
-    return _up_to_full_load(grid, lines, full) if lines.regular else grid
+    return _up_to_full_load(grid, lines, full) if lines.regular else (grid, 0)
 
 
 def _fill_down_to(row: Array, axis: Array, least: float) -> None:
@@ -135,33 +139,40 @@ def _fill_down_to(row: Array, axis: Array, least: float) -> None:
         row[gap] = np.interp(axis[gap], [least, axis[known[0]]], [0.0, row[known[0]]])
 
 
-def _up_to_full_load(grid: Grid, lines: Lines, full: Curve) -> Grid:
+def _up_to_full_load(grid: Grid, lines: Lines, full: Curve) -> tuple[Grid, int]:
     """The grid with corners of cells that the full-load curve cuts, each row continued linearly beyond its top.
 
     A rectangular cell needs them to be used up to the curve; beyond it the engine cannot go. Left out where the
     curve lies above the measured points, so that nothing is used that they do not enclose.
     """
     speed, torque, values = grid.speed_radps, grid.torque_nm, grid.values.copy()
-    envelope = envelope_nm(lines)
+    envelope, continued = envelope_nm(lines), 0
     for i, row in enumerate(values):
         near = np.linspace(speed[max(i - 1, 0)], speed[min(i + 1, len(speed) - 1)], _SAMPLES)
         wanted = np.interp(near, full.speed_radps, full.torque_nm)
         known = np.flatnonzero(~np.isnan(row))
         if len(known) < 2 or (wanted > np.interp(near, *envelope) * (1 + _ROUNDING)).any():
             continue
+        continued += 1
         j, k = known[-2:]
         top = int(np.searchsorted(torque, wanted.max() * (1 - _ROUNDING)))
         beyond = slice(k + 1, top + 1)
         slope = (row[k] - row[j]) / (torque[k] - torque[j])
         row[beyond] = np.maximum(row[k] + slope * (torque[beyond] - torque[k]), 0.0)
-    return Grid(speed, torque, values)
+    return Grid(speed, torque, values), continued
 
 
 def _and_motoring(lines: Lines, motoring: Curve) -> Lines:
-    """The points and those of the motoring curve at the speeds of the lines; fired points below it left out."""
+    """The points and those of the motoring curve at the speeds of the lines; fired points below it left out.
+
+    Without speed lines the curve's are a few, evenly apart: one at every point's speed would part close points.
+    """
     points, own = lines.points, lines.speed_radps
+    above = points.torque_nm > on_speeds(motoring, own)[lines.line]
+    first = 0
+    if not lines.regular:
+        first, own = len(own), np.linspace(own[0], own[-1], _MOTORING_POINTS)
     drag = on_speeds(motoring, own)
-    above = points.torque_nm > drag[lines.line]
     count = len(own)
     joined = Points(
         np.concatenate([points.speed_radps[above], own]),
@@ -172,5 +183,6 @@ def _and_motoring(lines: Lines, motoring: Curve) -> Lines:
         points.roles,
         points.notes,
     )
-    line = np.concatenate([lines.line[above], np.arange(count)])
-    return Lines(joined, line, own, lines.regular, lines.notes)
+    line = np.concatenate([lines.line[above], first + np.arange(count)])
+    speed = np.concatenate([lines.speed_radps[:first], own])
+    return Lines(joined, line, speed, lines.regular, lines.notes)

@@ -24,10 +24,6 @@ from hevopt.units import RPM_PER_RADPS, TO_SI
 _ENGINE_KEYS = (
     "displacement_cm3", "bore_mm", "stroke_mm", "idle_rpm", "inertia_kgm2", "start_fuel_g", "fuel",
 )  # fmt: skip
-_CORNERS = (
-    "cells cut by the full-load curve: corners beyond it continue the row, so that the map reaches up to the "
-    "curve; the engine never goes there"
-)
 _FUEL_KEYS = ("heating_value_mjpkg", "density_kgpl", "co2_kgpkg")
 
 
@@ -35,7 +31,7 @@ def import_engine(request: Request) -> Imported:
     """An engine with a measured map; DataError where something is missing or wrong."""
     like = like_component(request.like, EngineFile)
     base, origins = _engine_base(request, like)
-    facts = _facts(base)
+    facts = _facts(base, request.given)
     points = read_points(request.source, "fuel", facts)
     if points is None:
         raise DataError(
@@ -47,8 +43,13 @@ def import_engine(request: Request) -> Imported:
     axes = axes_of(lines)
     motoring = motoring_curve(request, lines, like, base["displacement_cm3"], facts)
     full = full_load(request, lines, facts)
-    grid = flow_grid(lines, axes, motoring, full)
-    notes = [*points.notes, *lines.notes, axes.rule, motoring.note, full.note, _CORNERS]
+    grid, continued = flow_grid(lines, axes, motoring, full)
+    notes = [*points.notes, *lines.notes, axes.rule, motoring.note, full.note]
+    if continued:
+        notes.append(
+            f"cells cut by the full-load curve: at {continued} of {len(grid.speed_radps)} speeds corners beyond "
+            "it continue the row, so that the map reaches up to the curve there; the engine never goes beyond it"
+        )
     contents = base | {
         "full_load": {
             "speed_rpm": rpm_list(full.speed_radps),
@@ -64,11 +65,11 @@ def import_engine(request: Request) -> Imported:
     used = points.roles | motoring.roles | full.roles
     nox = _nox(request, facts, points.rectangular, idle_radps)
     if nox is None:
-        notes.append("NOx: none given; the engine emits none in any result")
+        notes.append("NOx: none given, so it is not known in any result")
     else:
         used |= nox.points.roles
         notes += [note for note in nox.points.notes if note.startswith("nox")]
-        nox_grid = flow_grid(nox, axes, motoring, full)
+        nox_grid, _ = flow_grid(nox, axes, motoring, full)
         contents["fuel_map"]["nox_gps"] = (nox_grid.values * 1e3).tolist()
         less = int((np.isnan(nox_grid.values) & ~np.isnan(grid.values)).sum())
         if less:
@@ -104,8 +105,11 @@ def _dotted(keys: tuple[str, ...]) -> list[str]:
     return [f"fuel.{key}" for key in keys]
 
 
-def _facts(base: Mapping[str, Any]) -> EngineFacts:
-    """The figures that units need, checked as the component's file will be."""
+def _facts(base: Mapping[str, Any], given: Mapping[str, Any]) -> EngineFacts:
+    """The figures that units need where they are given, checked as the component's file will be.
+
+    Those of --like are another engine's, and measured data are not converted with them.
+    """
     values = {
         "idle_rpm": base["idle_rpm"],
         "displacement_cm3": base["displacement_cm3"],
@@ -115,10 +119,14 @@ def _facts(base: Mapping[str, Any]) -> EngineFacts:
     for key, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
             raise DataError(f"{key} = {value!r}: a number above 0 is needed")
-    _, displacement, heat, density = values.values()
-    return EngineFacts(
-        displacement * TO_SI["_cm3"][1], heat * TO_SI["_mjpkg"][1], density * TO_SI["_kgpl"][1]
-    )
+    own = [
+        values[key] * TO_SI[key[key.rindex("_") :]][1]
+        if key in given or key.split(".")[0] in given
+        else None
+        for key in values
+        if key != "idle_rpm"
+    ]
+    return EngineFacts(*own)
 
 
 def _nox(request: Request, facts: EngineFacts, in_grid: bool, idle_radps: float) -> Lines | None:

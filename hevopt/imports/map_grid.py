@@ -1,7 +1,8 @@
 """Measured points put on a rectangular grid of speed and torque, without extrapolation.
 
-Rule. Speeds closer than 12 rpm or 0.5 % are one speed line; flows move to its mean in proportion to speed. Where
-the lines share their torques (90 % of all torques between their lowest and highest are measured), lines and torques
+Rule. Speeds closer than 12 rpm or 0.5 % are one speed line, or, where that gives no lines and the gaps between
+them are clear, 30 rpm or 1 %, then 60 rpm or 2 %; flows move to its mean in proportion to speed. Where the
+lines share their torques (90 % of all torques between their lowest and highest are measured), lines and torques
 are the grid and every value stays as it is. Other points are joined by triangles (Delaunay, both axes scaled to
 equal length) and interpolated linearly on them; what lies outside their hull, or beyond the outermost torques
 measured around that speed, is not a number.
@@ -22,6 +23,10 @@ Array = NDArray[np.float64]
 
 _LINE_RPM = 12.0
 _LINE_SHARE = 0.005
+# Wider lines, of speeds held less well: taken where they stand this many of their widths apart.
+_WIDER = ((30.0, 0.01), (60.0, 0.02))
+_APART = 2.0
+_PER_LINE = 3
 _SAME = 1e-6
 _FILLED = 0.9
 _STEPS = 60
@@ -74,12 +79,8 @@ def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> 
     """
     if len(points.value) < _POINTS_MIN:
         raise DataError(f"{len(points.value)} points; a map needs {_POINTS_MIN} or more")
-    line, mean = _clusters(points.speed_radps, _LINE_RPM / RPM_PER_RADPS, _LINE_SHARE)
-    idle = np.abs(mean - idle_radps) <= _LINE_RPM / RPM_PER_RADPS
-    mean = np.where(idle & (idle.sum() == 1), idle_radps, mean)
+    line, mean, regular = _speed_lines(points, idle_radps)
     moved = np.abs(points.speed_radps - mean[line])
-    reach = np.maximum(_LINE_RPM / RPM_PER_RADPS, _LINE_SHARE * mean[line])
-    regular = 1 < len(mean) <= len(line) / 2 and (moved <= reach).all()
     if points.rectangular or not regular:
         line, mean = _clusters(points.speed_radps, 0.0, _SAME)
         moved = np.zeros(len(line))
@@ -96,6 +97,31 @@ def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> 
     if repeated:
         notes.append(f"{repeated} points measured more than once, averaged")
     return Lines(merged, line, mean, regular or points.rectangular, tuple(notes))
+
+
+def _speed_lines(points: Points, idle_radps: float) -> tuple[NDArray[np.int64], Array, bool]:
+    """Line of each point, the lines' speeds, and whether the points stand on such lines."""
+    speed = points.speed_radps
+    for rpm, share in ((_LINE_RPM, _LINE_SHARE), *_WIDER):
+        line, mean = _clusters(speed, rpm / RPM_PER_RADPS, share)
+        clear = rpm == _LINE_RPM or _clear(speed, line)
+        idle = np.abs(mean - idle_radps) <= _LINE_RPM / RPM_PER_RADPS
+        mean = np.where(idle & (idle.sum() == 1), idle_radps, mean)
+        reach = np.maximum(rpm / RPM_PER_RADPS, share * mean[line])
+        held = (np.abs(speed - mean[line]) <= reach).all()
+        if 1 < len(mean) <= len(line) / 2 and held and clear:
+            return line, mean, True
+    return line, mean, False
+
+
+def _clear(speed_radps: Array, line: NDArray[np.int64]) -> bool:
+    """Whether lines of enough points stand well apart."""
+    count = line.max() + 1
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, line, speed_radps)
+    np.maximum.at(high, line, speed_radps)
+    apart = (low[1:] - high[:-1]).min(initial=np.inf)
+    return len(line) >= _PER_LINE * count and apart >= _APART * (high - low).max()
 
 
 def axes_of(lines: Lines) -> Axes:
@@ -118,7 +144,7 @@ def axes_of(lines: Lines) -> Axes:
     torque = torque_axis(torque[0], torque[-1])
     _check_axes(speed, torque)
     how = "speed lines" if lines.regular else "irregular points"
-    rule = f"{how} put on a grid: linear on the triangles between measured points, nothing outside them"
+    rule = f"{how} put on a grid: linear on the triangles between measured points"
     return Axes(speed, torque, False, rule)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hevopt.datafile import Model, read_toml
 from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
-from hevopt.files import find
+from hevopt.files import find, shown
 from hevopt.imports.map_grid import Grid, Lines
 from hevopt.imports.map_tables import Source
 from hevopt.keypaths import with_changes
@@ -18,6 +18,8 @@ from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
+
+_MEASURED = ("full_load", "fuel_map", "fuel_coefficients", "nox_coefficients", "loss_map")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,18 @@ def like_component(name: str | None, model: type[Model]) -> Model | None:
 def with_given(
     base: dict[str, Any], origins: dict[str, str], given: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """Keys and their origins with those that the user gives in their place."""
+    """Keys and their origins with those that the user gives in their place; DataError for what is measured."""
+    for key in given:
+        head = key.split(".")[0]
+        if head in _MEASURED:
+            raise DataError(
+                f"--set {shown(key)}: {head} is what the import writes from the measured points; leave it out"
+            )
+        if head == "scale":
+            raise DataError(
+                f"--set {shown(key)}: the map is written as measured; give scale where a car uses the component, "
+                'such as engine = { file = "./engine.toml", scale = { displacement = 1.2 } }'
+            )
     return with_changes(base, given), origins | dict.fromkeys(given, "given")
 
 

@@ -18,17 +18,20 @@ from hevopt.imports.map_import import (
     rpm_list,
     with_given,
 )
-from hevopt.imports.map_points import EngineFacts, read_points
+from hevopt.imports.map_points import Curve, EngineFacts, read_curve, read_points
 from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
+
+_SAMPLES = 21
+_ROUNDING = 1e-6
 
 
 def import_machine(request: Request) -> Imported:
     """A machine with a measured loss map; DataError where something is missing or wrong."""
-    if request.extra:
+    engines = sorted({*request.extra} - {"full"})
+    if engines:
         raise DataError(
-            f"{', '.join(sorted(request.extra))}: of an engine only; a machine's limits come from its points, or "
-            "from --set torque_max_nm=VALUE and power_max_w=VALUE"
+            f"{', '.join(engines)}: of an engine only; a machine's map is its loss at torques of both signs"
         )
     like = like_component(request.like, MachineFile)
     points = read_points(request.source, "loss", EngineFacts(None, None, None))
@@ -37,7 +40,10 @@ def import_machine(request: Request) -> Imported:
             f"{request.source.path.name}: no column of loss, electric power or efficiency found; name it with "
             "--column loss=NAME (or electric=, efficiency=)"
         )
-    check_used(request, points.roles)
+    limit = None
+    if "full" in request.extra:
+        limit = read_curve(request.extra["full"], "full", EngineFacts(None, None, None), plain=True)
+    check_used(request, points.roles | (limit.roles if limit is not None else frozenset()))
     lines = in_lines(points, proportional=False)
     axes = axes_of(lines)
     if axes.torque_nm[-1] <= 0:
@@ -48,15 +54,21 @@ def import_machine(request: Request) -> Imported:
     grid, added = _with_rest(on_axes(lines, axes.speed_radps, axes.torque_nm), symmetric)
     notes = [*points.notes, *lines.notes, axes.rule, *added]
     power = np.abs(lines.points.torque_nm * lines.points.speed_radps)
+    torque, top_radps, whence = np.abs(lines.points.torque_nm), lines.speed_radps[-1], "the points"
+    if limit is not None:
+        torque, power = limit.torque_nm, limit.torque_nm * limit.speed_radps
+        top_radps, whence = limit.speed_radps[-1], "the full-load curve"
+        grid, masked = _within(grid, limit)
+        notes += [limit.note, *masked]
     base: dict[str, Any] = {
         "name": request.source.path.stem,
         "kind": "map",
         "power_max_w": float(f"{power.max():.6g}"),
-        "torque_max_nm": float(np.abs(lines.points.torque_nm).max()),
-        "speed_max_rpm": rpm_list(lines.speed_radps[-1:])[0],
+        "torque_max_nm": float(torque.max()),
+        "speed_max_rpm": rpm_list([top_radps])[0],
         "inertia_kgm2": 0.0 if like is None else like.inertia_kgm2,
     }
-    origins = dict.fromkeys(base, "largest of the points") | {
+    origins = dict.fromkeys(base, f"largest of {whence}") | {
         "name": "the file's name",
         "kind": "",
         "inertia_kgm2": "assumed: no --like" if like is None else f"from {request.like}",
@@ -72,6 +84,27 @@ def import_machine(request: Request) -> Imported:
     }
     file = checked(f"component from {request.source.path.name}", contents, MachineFile)
     return Imported(contents, file, origins, tuple(notes), _both_signs(grid), lines)
+
+
+def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
+    """The grid without cells beyond a limit of torque over speed, but with the corners of those it cuts."""
+    if (limit.torque_nm <= 0).any():
+        raise DataError(
+            f"full-load curve: torque {limit.torque_nm.min():g} Nm; every torque must be above 0"
+        )
+    speed, torque = grid.speed_radps, grid.torque_nm
+    values, known = grid.values.copy(), np.isfinite(grid.values)
+    for i, row in enumerate(values):
+        near = np.linspace(speed[max(i - 1, 0)], speed[min(i + 1, len(speed) - 1)], _SAMPLES)
+        most = np.interp(near, limit.speed_radps, limit.torque_nm).max()
+        top = min(int(np.searchsorted(torque, most * (1 - _ROUNDING))), len(torque) - 1)
+        low = max(int(np.searchsorted(torque, -most * (1 - _ROUNDING), "right")) - 1, 0)
+        row[(torque > torque[top]) | (torque < torque[low])] = np.nan
+    gone = int((known & np.isnan(values)).sum())
+    return Grid(speed, torque, values), [
+        "full-load curve: torque_max_nm, power_max_w and speed_max_rpm are its largest torque, power and speed; "
+        f"{gone} cells of the map wholly beyond it are left out"
+    ]
 
 
 def _with_rest(grid: Grid, symmetric: bool) -> tuple[Grid, list[str]]:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class EngineFacts:
-    """What some units need; None where unknown."""
+    """What some units need; None where not given for the very component that was measured."""
 
     displacement_m3: float | None
     heating_value_jpkg: float | None
@@ -111,13 +111,21 @@ def read_curve(source: Source, role: str, facts: EngineFacts, *, plain: bool) ->
 
 
 def _torque_nm(table: Table, role: str, facts: EngineFacts) -> Array:
-    values = table.values[role]
-    if table.kinds[role] == "torque":
+    values, kind = table.values[role], table.kinds[role]
+    if kind == "torque":
         return values
+    if kind == "power":
+        still = (table.values["speed"] == 0) & ~np.isnan(values)
+        if still.any():
+            raise DataError(
+                f"{table.measured.path}, {_places(table, still)}: {role} is a power, which says nothing about "
+                "torque at rest; give the torque, or delete the rows"
+            )
+        return values / np.where(table.values["speed"] == 0, np.nan, table.values["speed"])
     if facts.displacement_m3 is None:
         raise DataError(
-            f"{table.measured.path}: {role} is a mean pressure, which needs the displacement; give "
-            "--displacement-cm3 or --like"
+            f"{table.measured.path}: {role} is a mean pressure, which needs the displacement of the engine "
+            "measured (--like's may be another); give --displacement-cm3 VALUE"
         )
     return values * facts.displacement_m3 / (4 * pi)
 
@@ -153,7 +161,8 @@ def _value(table: Table, role: str, what: str, torque_nm: Array, facts: EngineFa
 def _known(table: Table, value: float | None, what: str, key: str) -> float:
     if value is None:
         raise DataError(
-            f"{table.measured.path}: {what} needs {key}; give --set {key}=VALUE or --like"
+            f"{table.measured.path}: {what} needs {key} of the fuel measured (--like's may be another); give "
+            f"--set {key}=VALUE"
         )
     return value
 

@@ -1,11 +1,12 @@
 """What a measured map covers: shares, best point, idle, holes and places where fuel falls as torque rises."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.engine_file import EngineFile
+from hevopt.imports.map_gaps import WIDE, lowest_fired_nm, widest_gap
 from hevopt.imports.map_grid import Grid, Lines
 from hevopt.imports.map_import import Imported
 from hevopt.machine_file import MachineFile
@@ -16,7 +17,11 @@ Array = NDArray[np.float64]
 _FINE = 200
 _LISTED = 6
 _ROUNDING = 1e-6
-_TINY = 1e-300
+_TINY = 1e-12
+_SLACK = 0.01
+_OFF = 0.02
+_ABOVE = 1.05
+_EFFICIENCIES = (0.15, 0.6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +55,7 @@ def envelope_of(file: EngineFile | MachineFile, count: int = _FINE) -> Envelope:
 def _engine(imported: Imported, file: EngineFile) -> list[str]:
     grid, envelope = imported.grid, envelope_of(file)
     heat = file.fuel.heating_value_mjpkg * 1e6
-    said = [_extent(grid), _share(grid, envelope, "between motoring and full load")]
+    said = [_extent(grid), *_engine_share(imported, envelope)]
     speed, torque = _mesh(grid)
     with np.errstate(invalid="ignore", divide="ignore"):
         efficiency = np.where(torque > 0, torque * speed / (grid.values * heat), np.nan)
@@ -62,9 +67,12 @@ def _engine(imported: Imported, file: EngineFile) -> list[str]:
         said.append(
             f"peak efficiency: {best:.1%} ({specific:.1f} g/kWh) at {_place(speed[k], torque[k])}"
         )
-        if best > 0.6:
-            said.append("  WARNING: more than any engine reaches; check units and heating value")
-    said.append(_idle(grid, file))
+        least, most = _EFFICIENCIES
+        if not least <= best <= most:
+            than = "more than any engine reaches" if best > most else "less than any engine has"
+            said.append(f"  WARNING: {than}; check units and heating value")
+    said.append(_idle(imported, file))
+    said += _above_full_load(imported.lines, file)
     return said + _faults(imported, envelope, "fuel")
 
 
@@ -97,15 +105,80 @@ def _extent(grid: Grid) -> str:
 
 
 def _share(grid: Grid, envelope: Envelope, where: str) -> str:
-    shares = np.linspace(0.0, 1.0, _FINE)
-    torque = envelope.low_nm[:, None] * (1 - shares) + envelope.high_nm[:, None] * shares
-    known = ~np.isnan(grid.at(torque, envelope.speed_radps[:, None]))
+    _, known = _between(grid, envelope)
     height = (envelope.high_nm - envelope.low_nm)[:, None]
     share = (known * height).sum() / (height.sum() * _FINE)
     return f"coverage: {share:.1%} of the area {where}; what the car asks for elsewhere is rejected"
 
 
-def _idle(grid: Grid, file: EngineFile) -> str:
+def _between(grid: Grid, envelope: Envelope) -> tuple[Array, NDArray[np.bool_]]:
+    """(speed, share) torques evenly from the lowest to the highest at each speed, and which are known."""
+    shares = np.linspace(0.0, 1.0, _FINE)
+    torque = envelope.low_nm[:, None] * (1 - shares) + envelope.high_nm[:, None] * shares
+    return torque, ~np.isnan(grid.at(torque, envelope.speed_radps[:, None]))
+
+
+def _engine_share(imported: Imported, envelope: Envelope) -> list[str]:
+    """Coverage by what was measured, what is assumed below it, and where the map ends below full load."""
+    grid, lines = imported.grid, imported.lines
+    torque, known = _between(grid, replace(envelope, low_nm=np.zeros_like(envelope.low_nm)))
+    lowest = lowest_fired_nm(lines, envelope.speed_radps)
+    measured = known & (torque >= lowest[:, None] - _slack_nm(lines))
+    high = envelope.high_nm[:, None]
+    area = high.sum() * _FINE
+    share, rest = (measured * high).sum() / area, ((known & ~measured) * high).sum() / area
+    ends = dict.fromkeys(f"{t:.4g}" for t in (lowest.min(), lowest.max()))
+    said = [
+        f"coverage: {share:.1%} of the area between torque 0 and full load is measured, {rest:.1%} assumed as "
+        "said next; what the car asks for elsewhere is rejected",
+        f"ASSUMED below the lowest measured torque ({' to '.join(ends)} Nm): linear from there to no fuel at the "
+        "motoring curve (hatched in the plot)",
+    ]
+    short = envelope.high_nm - np.where(known, torque, 0.0).max(axis=1)
+    inside = (envelope.speed_radps >= grid.speed_radps[0]) & (
+        envelope.speed_radps <= grid.speed_radps[-1]
+    )
+    short = np.where(inside, short, 0.0)
+    ending = short > _SLACK * envelope.high_nm
+    if ending.any():
+        rpm = envelope.speed_radps * RPM_PER_RADPS
+        k = int(np.argmax(short))
+        said.append(
+            f"full load: the map ends below the curve at {np.mean(ending):.0%} of the speeds ("
+            f"{rpm[ending][0]:.0f} to {rpm[ending][-1]:.0f} rpm), by up to {short[k]:.3g} Nm at {rpm[k]:.0f} rpm; "
+            "the engine gives no more than the map covers; add points up to the curve"
+        )
+    if not inside.all():
+        ends = [f"{s * RPM_PER_RADPS:.4g}" for s in grid.speed_radps[[0, -1]]]
+        said.append(
+            f"full load: its curve or idle lies beyond the map's speeds, {ends[0]} to {ends[1]} rpm; what "
+            "the car asks for there is rejected"
+        )
+    return said
+
+
+def _slack_nm(lines: Lines) -> float:
+    """By how much a torque that was to be held may miss."""
+    return _SLACK * float(np.abs(lines.points.torque_nm).max())
+
+
+def _above_full_load(lines: Lines, file: EngineFile) -> list[str]:
+    """A warning where the engine was measured well above its full-load curve."""
+    points, full = lines.points, file.full_load
+    limit = np.interp(points.speed_radps * RPM_PER_RADPS, full.speed_rpm, full.torque_nm)
+    over = points.torque_nm / limit
+    above = over > _ABOVE
+    if not above.any():
+        return []
+    k = int(np.argmax(over))
+    return [
+        f"WARNING: {above.sum()} points were measured above full load, by up to {over[k] - 1:.0%} at "
+        f"{_place(points.speed_radps[k], points.torque_nm[k])}; check units, displacement and --full-load"
+    ]
+
+
+def _idle(imported: Imported, file: EngineFile) -> str:
+    grid, lines = imported.grid, imported.lines
     flow = float(grid.at(np.array(0.0), np.array(file.idle_rpm / RPM_PER_RADPS)))
     at = f"idle fuel ({file.idle_rpm:g} rpm, torque 0)"
     if np.isnan(flow):
@@ -113,7 +186,14 @@ def _idle(grid: Grid, file: EngineFile) -> str:
             f"{at}: WARNING: outside the map; a car with this engine cannot idle; add points there"
         )
     litres = flow * 3600 / file.fuel.density_kgpl
-    return f"{at}: {flow * 1e3:.4g} g/s, {litres:.3g} l/h"
+    said = f"{at}: {flow * 1e3:.4g} g/s, {litres:.3g} l/h"
+    lowest = float(lowest_fired_nm(lines, np.array(file.idle_rpm / RPM_PER_RADPS)))
+    if lowest <= _slack_nm(lines):
+        return said
+    return (
+        f"{said}; WARNING: NOT MEASURED but assumed, linear from {lowest:.4g} Nm to no fuel at the motoring "
+        "curve, and may be far off; add points at torque 0"
+    )
 
 
 def _faults(imported: Imported, envelope: Envelope, what: str) -> list[str]:
@@ -134,7 +214,7 @@ def _faults(imported: Imported, envelope: Envelope, what: str) -> list[str]:
         said.append(
             f"fuel falling as torque rises at one speed: {_listed(falls, speed[:, 1:], torque[:, 1:])}"
         )
-    return [*said, _at_points(grid, lines, what), *_widest_gap(grid, lines)]
+    return [*said, _at_points(grid, lines, what), *_widest_gap(lines)]
 
 
 def _listed(where: NDArray[np.bool_], speed: Array, torque: Array) -> str:
@@ -150,37 +230,32 @@ def _at_points(grid: Grid, lines: Lines, what: str) -> str:
     known = ~np.isnan(there)
     if not known.any():
         return f"measured points: none of {len(there)} lies in a full cell of the grid"
-    off = np.abs(there - points.value)[known]
-    k = int(np.argmax(off))
-    speed, torque = points.speed_radps[known][k], points.torque_nm[known][k]
-    of_top = off[k] / max(points.value.max(), _TINY)
+    off, top = np.abs(there - points.value)[known], max(float(points.value.max()), _TINY)
+    relative = off / np.maximum(points.value[known], _SLACK * top)
+    k = int(np.argmax(relative))
+    place = _place(points.speed_radps[known][k], points.torque_nm[known][k])
+    many = int((relative > _OFF).sum())
+    warning = f"; WARNING: more than {_OFF:.0%} at {many} points, whose neighbours disagree" * (
+        many > 0
+    )
     outside = f"; {np.sum(~known)} lie at the edge, outside full cells" if (~known).any() else ""
     return (
-        f"grid against {known.sum()} measured points: {what} differs by {of_top:.2g} of the largest at most, at "
-        f"{_place(speed, torque)}{outside}"
+        f"grid against {known.sum()} measured points: {what} differs by {relative[k]:.2%} at most, at {place}, and "
+        f"by {off.max() / top:.2%} of the largest value{outside}{warning}"
     )
 
 
-def _widest_gap(grid: Grid, lines: Lines) -> list[str]:
-    """Where the grid leans on points that are furthest away, between the lowest and highest measured torque."""
-    from scipy.spatial import cKDTree
-
-    points = lines.points
-    speed, torque = _mesh(grid)
-    used = ~np.isnan(grid.values) & (torque >= points.torque_nm.min())
-    span = np.array([np.ptp(points.speed_radps), np.ptp(points.torque_nm)])
-    cells = np.column_stack([speed[used], torque[used]])
-    away, nearest = cKDTree(np.column_stack([points.speed_radps, points.torque_nm]) / span).query(
-        cells / span
-    )
-    k = int(np.argmax(away))
-    if away[k] < _ROUNDING:
+def _widest_gap(lines: Lines) -> list[str]:
+    """Where the map leans on points that are furthest away, between the lowest and highest measured torque."""
+    gap = widest_gap(lines)
+    if gap is None:
         return []
-    near = points.speed_radps[nearest[k]], points.torque_nm[nearest[k]]
-    return [
-        f"widest gap between measured points: the cell at {_place(*cells[k])}, whose nearest point is at "
-        f"{_place(*near)}"
-    ]
+    said = (
+        f"widest gap between measured points: around {_place(gap.speed_radps, gap.torque_nm)}, "
+        f"{gap.times:.1f} times the usual distance from a point (the nearest is at {_place(*gap.near)})"
+    )
+    wide = "; WARNING: a hole in the measurement, filled by interpolation; add points there"
+    return [said + wide * (gap.times > WIDE)]
 
 
 def _mesh(grid: Grid) -> tuple[Array, Array]:

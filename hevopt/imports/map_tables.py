@@ -51,16 +51,25 @@ _ALIASES = {
 }  # fmt: skip
 _QUANTITIES = {
     "speed": ("rotation",),
-    "torque": ("torque", "pressure"),
+    "torque": ("torque", "pressure", "power"),
     "fuel": ("mass flow", "specific consumption", "volume flow"),
     "specific": ("specific consumption",),
     "efficiency": ("fraction",),
     "nox": ("mass flow", "specific consumption"),
     "loss": ("power",),
     "electric": ("power",),
-    "full": ("torque", "pressure"),
-    "motoring": ("torque", "pressure"),
+    "full": ("torque", "pressure", "power"),
+    "motoring": ("torque", "pressure", "power"),
 }
+# What a column of shaft power is called, read as its torque where no column holds that.
+_POWERS = {
+    "torque": {
+        "power", "pe", "brakepower", "enginepower", "machinepower", "motorpower", "shaftpower",
+        "mechanicalpower",
+    },
+    "full": {"fullloadpower", "maxpower", "powermax", "maximumpower"},
+    "motoring": {"motoringpower", "dragpower", "frictionpower"},
+}  # fmt: skip
 ROLES = tuple(_ALIASES)
 VALUES_OF = {
     "fuel": ("fuel", "specific", "efficiency"),
@@ -126,15 +135,20 @@ def curve_table(source: Source, role: str, *, plain: bool) -> Table | None:
 def _column(measured: Measured, source: Source, role: str) -> Column | None:
     if role in source.columns:
         return column_named(measured, source.columns[role])
-    return column_of(measured, _ALIASES[role], f"--column {role}=NAME")
+    option = f"--column {role}=NAME"
+    column = column_of(measured, _ALIASES[role], option)
+    if column is None and role in _POWERS:
+        return column_of(measured, _POWERS[role], option)
+    return column
 
 
 def _needed(measured: Measured, source: Source, role: str) -> Column:
     column = _column(measured, source, role)
     if column is None:
+        rest = "".join(f"; {note}" for note in measured.notes if note.startswith("left out"))
         raise DataError(
             f"{measured.path}: no column of {role} found; name it with --column {role}=NAME (a grid needs "
-            f"numbers in its first row behind a label in its first cell); {columns_found(measured)}"
+            f"numbers in its first row behind a label in its first cell); {columns_found(measured)}{rest}"
         )
     return column
 
@@ -186,6 +200,11 @@ def _grid(measured: Measured, source: Source, what: str) -> Table:
         measured.notes,
     )  # fmt: skip
     table = _long(flat, source, {column.name: column for column in flat.columns})
+    if table.kinds["torque"] == "power":
+        raise DataError(
+            f"{measured.path}: a grid's axes are speed and torque or mean pressure; give power in a table with "
+            "a row per point"
+        )
     notes = (*table.notes, f"grid: {rows} rows of {down}, {len(head)} columns of {across}")
     return Table(measured, table.values, table.kinds, lines, True, notes)
 

@@ -4,8 +4,8 @@ Text with any usual separator, decimal mark and encoding, .xlsx and .mat. A unit
 the name's suffix or the convention of a known tool; where none says it, whoever needs it must be told.
 """
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import printable, shown
-from hevopt.imports.measured_names import base_of, unit_by_convention, unit_in_name
+from hevopt.imports.measured_names import (
+    base_of,
+    unit_by_convention,
+    unit_in_name,
+    units_in_name,
+)
 from hevopt.imports.measured_rows import Table, listed
 from hevopt.units import Unit, unit_named, units_of
 
@@ -35,7 +40,8 @@ class Column:
 
     unit: as the file writes it, None where nothing says it; source: how it is known
     values: (row,) NaN where the cell is empty or no number; strange: (row, text) of the first cells that are no
-    numbers, strange_count of them in all
+    numbers, strange_count of them in all; words: rows of each such text, of the first few texts
+    against: another unit that the file states, and how
     """
 
     name: str
@@ -44,6 +50,8 @@ class Column:
     source: str
     strange: tuple[tuple[int, str], ...] = ()
     strange_count: int = 0
+    words: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    against: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,16 +143,20 @@ def _columns(path: Path, table: Table) -> list[Column]:
             unit, source = table.units[i], table.units_source
         elif name in convention:
             unit, source = convention[name]
+        stated = [convention[name]] if name in convention else units_in_name(name)
+        against = next((s for s in stated if unit and unit_named(s[0]) != unit_named(unit)), None)
         strange, count = cells.strange, cells.strange_count
         values = cells.values()
         if cells.clock_count and not cells.number_count:
-            unit, source = "s", "dates or times of day"
+            unit, source, against = "s", "dates or times of day", None
         elif cells.clock_count:  # neither a column of numbers nor one of times
             line, text = cells.found["clock"]
             strange = [(int(np.searchsorted(table.lines, line)), text), *strange]
             count += cells.clock_count
         values.flags.writeable = False
-        columns.append(Column(name, unit, values, source, tuple(strange), count))
+        columns.append(
+            Column(name, unit, values, source, tuple(strange), count, cells.words, against)
+        )
     return columns
 
 
@@ -206,6 +218,8 @@ def in_si(
     """
     given, source = (unit, option) if unit is not None else (column.unit, column.source)
     known = known_unit(measured, column, given, allowed, option)
+    if unit is None:
+        _refuse_contradiction(measured, column, allowed, option)
     if column.strange and not text_as_empty:
         faults = [f"line {measured.lines[row]}: {shown(text)}" for row, text in column.strange]
         more = column.strange_count - len(faults)
@@ -219,6 +233,20 @@ def in_si(
     values.flags.writeable = False
     note = f"{column.name} in {known.symbol} ({source})"
     return Quantity(column.name, known.quantity, values, note)
+
+
+def _refuse_contradiction(
+    measured: Measured, column: Column, allowed: Sequence[str], option: str
+) -> None:
+    """DataError where the file states two units; a suffix of another quantity is taken for a part of the name."""
+    if column.against is None:
+        return
+    unit, how = column.against
+    if how != "suffix of the name" or unit_named(unit).quantity in allowed:
+        raise DataError(
+            f"{measured.path}: column {column.name}: unit {shown(column.unit)} ({column.source}), but "
+            f"{shown(unit)} ({how}); correct the file, or say which holds with {option}"
+        )
 
 
 def known_unit(

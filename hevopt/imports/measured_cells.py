@@ -5,6 +5,7 @@ such as 0,5 or 12,75 must settle it. A number with both marks, or a file that us
 """
 
 import re
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -19,6 +20,8 @@ from hevopt.files import shown
 EMPTY = frozenset(("", "nan", "na", "n/a", "#n/a", "-", "--", "null", "none"))
 # Faults of one kind that a message lists before it counts the rest.
 LISTED = 20
+# Different texts of a column whose rows are all kept, such as north and south.
+_WORDS = 8
 # Beyond any measured value in any unit, and small enough that its square is a number.
 LARGEST = 1e100
 _PLAIN = re.compile(r"[0-9+\-.eE\n]*")
@@ -35,12 +38,14 @@ _CLOCK = re.compile(r"([0-9]{1,3}):([0-9]{2}):([0-9]{2}(?:[.,][0-9]+)?)")
 class Cells:
     """A column while it is read. `found` maps a way of writing to the first line and cell that has it.
 
-    strange: (row, text) of cells that are neither numbers nor empty; clock: rows with dates or times of day
+    strange: (row, text) of cells that are neither numbers nor empty; words: rows of each text among them, of the
+    first few texts; clock: rows with dates or times of day
     """
 
     chunks: list[NDArray[np.float64]] = field(default_factory=list)
     strange: list[tuple[int, str]] = field(default_factory=list)
     strange_count: int = 0
+    words: dict[str, array] = field(default_factory=dict)
     found: dict[str, tuple[int, str]] = field(default_factory=dict)
     clock_count: int = 0
     number_count: int = 0
@@ -123,6 +128,8 @@ def _slow(column: Cells, cell: str, line: int, row: int) -> float:
     column.strange_count += 1
     if len(column.strange) < LISTED:
         column.strange.append((row, cell))
+    if cell in column.words or len(column.words) < _WORDS:
+        column.words.setdefault(cell, array("q")).append(row)
     return np.nan
 
 

@@ -1,6 +1,7 @@
 """What the header of a measured file says: names, units, and the conventions of tools that leave units out."""
 
 import re
+from collections.abc import Collection
 
 from hevopt.cycle import COLUMNS as CYCLE_COLUMNS
 from hevopt.files import printable
@@ -15,7 +16,7 @@ _FIELD = re.compile(r"^[A-Za-z]\w*\.(?=[A-Za-z]\w*$)")
 # "gps" means g/s after these alone; elsewhere it names the satellites.
 _FLOWS = re.compile(r"fuel|nox|co|hc|pm|flow|mass", re.IGNORECASE)
 _FASTSIM = {"cycSecs": "s", "cycMps": "m/s", "cycGrade": "fraction"}
-_FASTSIM_PLAIN = {"mps", "grade"}
+_FASTSIM_SPEEDS = {"cycMps", "mps", "speed_meters_per_second"}
 _VECTO = {
     "<s>": "m", "<t>": "s", "<v>": "km/h", "<grad>": "%", "<stop>": "s", "<n>": "rpm",
     "<gear>": "fraction",
@@ -73,6 +74,18 @@ def _suffix(name: str) -> tuple[str, str] | None:
     return None
 
 
+def units_in_name(name: str) -> list[tuple[str, str]]:
+    """Every known unit that a name states and how, as `speed_kmh [m/s]` two; the one that counts first."""
+    match = _BRACKETS.fullmatch(name)
+    stated = [unit_in_name(name), *([unit_in_name(match[1])] if match else [])]
+    return [(unit, how) for unit, how in stated if unit and unit_named(unit)]
+
+
+def grade_ends_step(name: str, names: Collection[str]) -> bool:
+    """Whether a row's grade in this column holds over the step that ends at the row, as FASTSim's do."""
+    return name == "cycGrade" or (name == "grade" and not _FASTSIM_SPEEDS.isdisjoint(names))
+
+
 def base_of(name: str) -> str:
     """A name without its unit, in lower-case letters and digits, so that aliases can be compared."""
     if unit_in_name(name)[1] == "suffix of the name":
@@ -94,7 +107,7 @@ def unit_by_convention(names: list[str], vecto: bool = False) -> dict[str, tuple
     angle brackets in a .vdri file. hevopt: its own cycle files.
     """
     known = {n: (_FASTSIM[n], "FASTSim convention") for n in names if n in _FASTSIM}
-    if set(names) >= _FASTSIM_PLAIN:
+    if grade_ends_step("grade", names):
         known["grade"] = ("fraction", "FASTSim convention")
     elif "grade" in names and set(names) <= set(CYCLE_COLUMNS):
         known["grade"] = ("fraction", "hevopt convention")

@@ -168,7 +168,7 @@ def _detail(case: Case, plan: Plan, trajectory: Trajectory) -> Detail:
     return Detail(
         trace=_trace(case, trajectory, operation, on),
         energy=energy_of(trajectory, step_s, case.car.engine.heating_value_jpkg),
-        shares=shares_of(trajectory, table, operation),
+        shares=shares_of(trajectory, table, operation, nox_known=case.car.engine.nox_known),
         limits=limits_touched(case.car, case.problem, trajectory),
         engine_on_s=on_s,
         engine_off_s=off_s,
@@ -203,7 +203,7 @@ def _calibration(case: Case, notes: Mapping[str, Any]) -> list[Member]:
     if len(members) < 2:
         return []
     density, distance_m = case.car.engine.fuel_density_kgpm3, case.cycle.distance_m
-    weight = case.problem.nox_weight
+    weight, nox_known = case.problem.nox_weight, case.car.engine.nox_known
 
     def litres(mass_kg: float) -> float:
         return litres_per_100km(mass_kg, density, distance_m)
@@ -214,7 +214,7 @@ def _calibration(case: Case, notes: Mapping[str, Any]) -> list[Member]:
             nox_cap_kgps=member.get("nox_cap_kgps"),
             fuel_l_per_100km=litres(member["cost_kg"] - weight * member["nox_kg"]),
             corrected_l_per_100km=litres(member["corrected_kg"]),
-            nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m,
+            nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m if nox_known else None,
             surplus_j=member["surplus_j"],
             neutral=bool(member["neutral"]),
             chosen=n == notes["chosen"],

@@ -13,6 +13,8 @@ _J_PER_KWH = 3.6e6
 
 def comparison_page(results: Results) -> str:
     """The page as HTML, with the results inside."""
+    calibrated = any(row.detail and row.detail.calibration for row in results.rows)
+    studies = [("Calibration of the rules", calibrated), ("Sensitivity", results.sensitivity)]
     return render(
         "comparison.html.j2",
         ("comparison_rows.js", "comparison_row.js", "comparison.js"),
@@ -27,8 +29,19 @@ def comparison_page(results: Results) -> str:
         spells=[_spells(row) for row in results.rows if row.detail is not None],
         chosen=_first_shown(results),
         effects=_effects(results),
-        calibrated=any(row.detail and row.detail.calibration for row in results.rows),
+        calibrated=calibrated,
+        studied=", ".join(name for name, found in studies if found).capitalize(),
+        left_out=_left_out(results),
     )
+
+
+def _left_out(results: Results) -> list[str]:
+    """Sections that an option would add."""
+    options = (
+        ("the front of fuel and NOx (hevopt compare --fronts adds it)", results.pareto),
+        ("sensitivity (hevopt compare --sensitivity adds it)", results.sensitivity),
+    )
+    return [text for text, found in options if not found]
 
 
 def _figures(row: Row) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 Over a cycle energy goes both ways: the car's motion gives back in braking what traction put in, and the battery
 gives out what it stored. So that the picture has a direction, places through which energy passes both ways are
 split by the direction of the step: traction and braking, motor and generator, battery giving and taking.
+A loss has one name, in the picture and in the table of the balance.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,9 +22,10 @@ DRIVING, BRAKING = "Driveline, traction", "Driveline, braking"
 WHEELS, ROAD, DOWNHILL = "Wheels", "Road load", "Downhill"
 MOTOR, GENERATOR = "Motor", "Generator"
 DRAWN, STORED = "Battery, drawn", "Battery, stored"
-CLUTCH, GEARS, MACHINE_LOSS = "Clutch slip", "Gear losses", "Machine losses"
+CLUTCH, GEARBOX, MACHINE_GEAR = "Clutch slip", "Gearbox losses", "Machine gear losses"
+MACHINE_LOSS = "Machine losses"
 BATTERY_LOSS, AUXILIARIES, BRAKES = "Battery losses", "Auxiliaries", "Friction brakes"
-SHAFTS, UNREGAINED = "Spinning shafts", "Not regained"
+SHAFTS, UNREGAINED = "Spinning shafts", "Spin-up not regained"
 # A share of all energy below which a link is rounding.
 _TINY = 1e-9
 
@@ -36,6 +38,7 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
     total = {name: float(np.sum(flow * step_s)) for name, flow in trajectory.flows.items()}
     enough = _TINY * sum(abs(energy) for energy in links.values())
     wheel, battery = trajectory.flows["wheel_power_w"], trajectory.battery_power_w
+    heat_j = links[ENGINE, ENGINE_LOSS]
     return Energy(
         links=[
             Link(source=source, target=target, energy_j=energy)
@@ -48,18 +51,19 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
             Item(name="stored energy drawn, net", energy_j=total["battery_chemical_w"]),
         ],
         spent=[
-            Item(name="road load at the wheels", energy_j=total["wheel_power_w"]),
-            Item(name="auxiliaries", energy_j=total["auxiliary_power_w"]),
-            Item(name="friction brakes", energy_j=total["brake_power_w"]),
-            Item(name="engine losses", energy_j=total["engine_loss_w"]),
-            Item(name="starts and shifts", energy_j=starts_j),
-            Item(name="clutch slip", energy_j=total["clutch_loss_w"]),
-            Item(name="gearbox", energy_j=total["gearbox_loss_w"]),
-            Item(name="machine's gear", energy_j=total["machine_gear_loss_w"]),
-            Item(name="machine and inverter", energy_j=total["machine_loss_w"]),
-            Item(name="battery", energy_j=total["battery_loss_w"]),
+            Item(name=ROAD, energy_j=total["wheel_power_w"]),
+            Item(name=AUXILIARIES, energy_j=total["auxiliary_power_w"]),
+            Item(name=BRAKES, energy_j=total["brake_power_w"]),
+            Item(name=ENGINE_LOSS, energy_j=heat_j),
+            Item(name=DRAG, energy_j=total["engine_loss_w"] - heat_j),
+            Item(name=STARTS, energy_j=starts_j),
+            Item(name=CLUTCH, energy_j=total["clutch_loss_w"]),
+            Item(name=GEARBOX, energy_j=total["gearbox_loss_w"]),
+            Item(name=MACHINE_GEAR, energy_j=total["machine_gear_loss_w"]),
+            Item(name=MACHINE_LOSS, energy_j=total["machine_loss_w"]),
+            Item(name=BATTERY_LOSS, energy_j=total["battery_loss_w"]),
             Item(
-                name="spinning up shafts, net",
+                name=UNREGAINED,
                 energy_j=total["engine_inertia_w"] + total["machine_inertia_w"],
             ),
         ],
@@ -137,5 +141,6 @@ def _driveline_links(
     add(line, MACHINE_LOSS, np.where(here & motoring, np.maximum(-machine, 0), 0))
     add(line, GENERATOR, np.where(here & ~motoring, -machine, 0))
     add(line, CLUTCH, np.where(here, f["clutch_loss_w"], 0))
-    add(line, GEARS, np.where(here, f["gearbox_loss_w"] + f["machine_gear_loss_w"], 0))
+    add(line, GEARBOX, np.where(here, f["gearbox_loss_w"], 0))
+    add(line, MACHINE_GEAR, np.where(here, f["machine_gear_loss_w"], 0))
     add(line, BRAKES, np.where(here, f["brake_power_w"], 0))

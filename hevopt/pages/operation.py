@@ -55,7 +55,9 @@ def engine_on(trajectory: Trajectory, table: ControlTable) -> NDArray[np.bool_]:
     return np.array([table.controls[c].engine_on for c in trajectory.control])
 
 
-def shares_of(trajectory: Trajectory, table: ControlTable, operation: NDArray) -> list[Share]:
+def shares_of(
+    trajectory: Trajectory, table: ControlTable, operation: NDArray, *, nox_known: bool
+) -> list[Share]:
     """Time, distance, fuel and NOx of every mode of operation that occurs."""
     distance = table.signals.speed_mps * table.step_s
     return [
@@ -64,7 +66,7 @@ def shares_of(trajectory: Trajectory, table: ControlTable, operation: NDArray) -
             time_s=float(np.sum(table.step_s[here])),
             distance_m=float(np.sum(distance[here])),
             fuel_kg=float(np.sum(trajectory.fuel_kg[here])),
-            nox_kg=float(np.sum(trajectory.nox_kg[here])),
+            nox_kg=float(np.sum(trajectory.nox_kg[here])) if nox_known else None,
         )
         for code, name in enumerate(OPERATIONS)
         if (here := operation == code).any()

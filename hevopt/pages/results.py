@@ -121,23 +121,23 @@ class Energy(FileModel):
 
 
 class Share(FileModel):
-    """What one mode of operation takes of a cycle."""
+    """What one mode of operation takes of a cycle; NOx None where the engine has no data on it."""
 
     operation: str
     time_s: float
     distance_m: float
     fuel_kg: float
-    nox_kg: float
+    nox_kg: float | None
 
 
 class Member(FileModel):
-    """One member of a rule family: thresholds, and what comes of them."""
+    """One member of a rule family: thresholds, and what comes of them; NOx None where it is not known."""
 
     threshold_w: float
     nox_cap_kgps: float | None = None
     fuel_l_per_100km: float
     corrected_l_per_100km: float
-    nox_mg_per_km: float
+    nox_mg_per_km: float | None
     surplus_j: float
     neutral: bool
     chosen: bool
@@ -217,7 +217,7 @@ class Sensitivity(FileModel):
     values: list[float]
     fuel_l_per_100km: list[float]
     delta_percent: list[float]
-    nox_mg_per_km: list[float]
+    nox_mg_per_km: list[float | None]
     delta_nox_percent: list[float | None]
     elasticity: float | None
     elasticity_nox: float | None

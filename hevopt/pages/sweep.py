@@ -9,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from hevopt.pages.page import render
+from hevopt.pages.sweep_alerts import alerts
 from hevopt.pages.sweep_data import (
     CASES_MAX,
     DESIGNS_MAX,
@@ -26,22 +27,24 @@ from hevopt.pages.sweep_drawing import (
     plane_of,
     unit_of,
 )
-from hevopt.pages.sweep_effects import Effect, effect, is_numeric
-from hevopt.pages.sweep_verdict import Group, alerts, groups_of, shown_value, verdict
+from hevopt.pages.sweep_effects import Effect, effect, is_log, is_numeric
+from hevopt.pages.sweep_verdict import Group, groups_of, shown_value, verdict
 from hevopt.provenance import versions
 from hevopt.sweeps.child import code_digest
 from hevopt.sweeps.jobs import NOX_WEIGHT
 from hevopt.sweeps.reading import Record
 
 PRUNED_LISTED = 100
+# Entries of the store's meta that have a place of their own on the page.
+_SHOWN_APART = ("study", "command", "versions", "inputs")
 
 
 def sweep_page(sweep: Sweep) -> str:
     """The page as HTML, with the sweep's cases or designs inside."""
     figures = sweep.figures
     groups = groups_of(figures)
-    effects = [_effects(figures, group) for group in groups]
-    plane, words = plane_of(figures, groups)
+    effects = [_effects(sweep, group) for group in groups]
+    plane, words = plane_of(figures, groups, sweep.pruned)
     table = sweep.cases_csv or designs_csv(figures)
     data = json.dumps(drawn(figures, groups, effects, plane), separators=(",", ":"))
     return render(
@@ -57,8 +60,11 @@ def sweep_page(sweep: Sweep) -> str:
             (_broken(key), unit_of(key), is_numeric(values))
             for key, values in figures.values.items() if key != NOX_WEIGHT
         ],
+        logarithmic=any(is_numeric(of) and is_log(of) for of in figures.values.values()),
         merit=merit_name(figures),
-        best=[_line(figures, int(n)) for group in groups for n in group.ranked[:BEST_LISTED]],
+        best=[_line(figures, int(n)) for group in groups if group.weight is not None
+              for n in group.ranked[:BEST_LISTED]],
+        many_weights=groups[0].weight is None,
         effects=[(g.label, e) for g, found in zip(groups, effects, strict=True) for e in found],
         effect_panels=max(min(len(found), EFFECTS_DRAWN) for found in effects),
         plane=plane,
@@ -68,11 +74,19 @@ def sweep_page(sweep: Sweep) -> str:
         failures_all=sweep.tally.counts["failed"] + sweep.tally.counts["infeasible"],
         limits={"best": BEST_LISTED, "pruned": PRUNED_LISTED, "cases": CASES_MAX, "designs": DESIGNS_MAX,
                 "lines": LINES_MAX, "best_lines": BEST_LINES, "effects": EFFECTS_DRAWN},
-        facts={k: v for k, v in sweep.meta.items() if k not in ("study", "command")},
+        facts={k: v for k, v in sweep.meta.items() if k not in _SHOWN_APART},
+        inputs=_entries(sweep.meta.get("inputs")),
+        computed_by=_entries(sweep.meta.get("versions")),
         versions=versions(),
         same_code=sweep.meta.get("code_digest") == code_digest(),
         table=Markup(base64.b64encode(_packed(table)).decode()),
     )  # fmt: skip
+
+
+def _entries(text: str | None) -> dict[str, str]:
+    """Name -> text of a JSON object; empty where a store has none."""
+    found = json.loads(text) if text else {}
+    return {str(name): str(value) for name, value in found.items()}
 
 
 def _packed(contents: bytes) -> bytes:
@@ -141,12 +155,17 @@ def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
     }
 
 
-def _effects(figures: Figures, group: Group) -> list[Effect]:
-    """Effects of the parameters that vary, the largest share first."""
-    merit, chosen = figures.merit[group.ranked], group.ranked.tolist()
-    found = []
+def _effects(sweep: Sweep, group: Group) -> list[Effect]:
+    """Effects of the parameters that vary, the largest share first; none over weights that do not compare."""
+    if group.weight is None:
+        return []
+    figures, found = sweep.figures, []
+    chosen = group.ranked[~figures.short[group.ranked]]
+    place = {int(figures.number[n]): n for n in group.members}
+    pruned = [(place[p.design], p.bound) for p in sweep.pruned if p.design in place]
     for key, values in figures.values.items():
-        own = [values[n] for n in chosen]
-        if len(set(own)) > 1:
-            found.append(effect(key, own, merit))
+        own = [values[n] for n in chosen.tolist()]
+        others = [(values[n], bound) for n, bound in pruned]
+        if own and len({*own, *(value for value, _ in others)}) > 1:
+            found.append(effect(key, own, figures.merit[chosen], others))
     return sorted(found, key=lambda e: -(e.share or 0.0))

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -52,6 +53,7 @@ class Figures:
     bound: of the objective, mean over the cycles. Where the design was solved, for plans that leave at least the
     charge that its cases left, charge-corrected as they are; else the certified dual for the asked charge
     strategy, status: of the best cases, joined where cycles differ
+    steps_short: most steps on which a case did not follow its cycle; short: whether there is one
     fuel_per_nox: fuel (l/100 km) that 1 mg/km of NOx counts at weight 1, of the lightest fuel; None if never seen
     """
 
@@ -64,7 +66,12 @@ class Figures:
     bound: Array
     strategy: list[str]
     status: list[str]
+    steps_short: NDArray[np.int64]
     fuel_per_nox: float | None
+
+    @property
+    def short(self) -> NDArray[np.bool_]:
+        return self.steps_short > 0
 
     @property
     def merit(self) -> Array:
@@ -116,11 +123,11 @@ def load_sweep(path: Path) -> Sweep:
         figures, tally = summary_of(reader.records())
         if not len(figures.number):
             raise DataError(f"{path}: the store has no study yet; run hevopt sweep on it first")
+        unsolved = set(figures.number[np.isnan(figures.objective)].tolist())
+        pruned = [found for found in reader.pruned() if found.design in unsolved]
         few = tally.counts.total() <= CASES_MAX
         cases_csv = _csv(reader) if few else None
-        return Sweep(
-            printable(path.name), reader.meta(), figures, tally, reader.pruned(), cases_csv
-        )
+        return Sweep(printable(path.name), reader.meta(), figures, tally, pruned, cases_csv)
 
 
 def _csv(reader: Reader) -> bytes:
@@ -139,6 +146,7 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
     bounds: dict[tuple[int, str], float] = {}
     duals: dict[tuple[int, str], float] = {}
     worths: list[float] = []
+    short: Counter[int] = Counter()
     for record in records:
         _count(tally, record)
         designs.setdefault(record.design, (record.parameters, record.nox_weight))
@@ -148,6 +156,7 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
         if record.strategy == BOUND:
             duals[place] = row["bound_l_per_100km"]
             continue
+        short[record.design] = max(short[record.design], _steps_short(row["status"]))
         found = _solved(row)
         best[place] = min(best.get(place, found), found)
         own = _own_bound(row)
@@ -169,6 +178,7 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
         bound=np.array([nan if None in of else fsum(of) / len(of) for of in held]),
         strategy=[s.strategy for s in solved],
         status=[s.status for s in solved],
+        steps_short=np.array([short[n] for n in numbers], dtype=np.int64),
         fuel_per_nox=max(worths, default=None),
     )
     return figures, tally
@@ -196,9 +206,15 @@ def _solved(row: Mapping[str, Any]) -> Solved:
         row["objective_l_per_100km"],
         row["strategy"],
         row["fuel_corrected_l_per_100km"],
-        row["nox_mg_per_km"],
+        nan if row["nox_mg_per_km"] is None else row["nox_mg_per_km"],
         row["status"],
     )
+
+
+def _steps_short(status: str) -> int:
+    """Steps on which a row with that status did not follow its cycle."""
+    found = re.search(r"shortfall(?: at (\d+) step)?", status)
+    return int(found[1] or 1) if found else 0
 
 
 def _own_bound(row: Mapping[str, Any]) -> float:
@@ -223,11 +239,11 @@ def _mean_solved(solved: Sequence[Solved | None]) -> Solved:
 
 
 def designs_csv(figures: Figures) -> bytes:
-    """A line per design, only the best ones where there are more than DESIGNS_MAX."""
+    """A line per design, only the best ones, those that follow first, where there are more than DESIGNS_MAX."""
     merit = figures.merit
     order = np.arange(len(merit))
     if len(merit) > DESIGNS_MAX:
-        order = np.sort(np.argsort(merit, kind="stable")[:DESIGNS_MAX])
+        order = np.sort(np.lexsort((merit, figures.short))[:DESIGNS_MAX])
     columns: Mapping[str, Sequence[Any]] = {
         "design": figures.number.tolist(),
         **figures.values,

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.key_meanings import MEANINGS
-from hevopt.pages.sweep_data import Figures
+from hevopt.pages.sweep_data import Array, Figures
 from hevopt.pages.sweep_effects import Effect, is_log, is_numeric
 from hevopt.pages.sweep_front import Boundary, boundary, lines_boundary, pareto
 from hevopt.pages.sweep_verdict import Group, shown_value
 from hevopt.sweeps.jobs import NOX_WEIGHT
+from hevopt.sweeps.prune import Pruned
 
 BEST_LISTED = 20
 # Of more designs than LINES_MAX, BEST_LINES are drawn as lines and of the others every so many-th.
@@ -57,33 +58,81 @@ def merit_name(figures: Figures) -> str:
     return "objective" if np.isfinite(figures.objective).any() else "bound"
 
 
-def plane_of(figures: Figures, groups: Sequence[Group]) -> tuple[dict[str, Any] | None, list[str]]:
-    """Fuel against NOx: points of each group, the front found and the certified boundary; and what they say."""
-    solved = np.flatnonzero(np.isfinite(figures.objective))
+def plane_of(
+    figures: Figures, groups: Sequence[Group], pruned: Sequence[Pruned] = ()
+) -> tuple[dict[str, Any] | None, list[str]]:
+    """Fuel against NOx: points of each group, the front found and the certified boundary; and what they say.
+
+    Designs that do not follow the cycle are points, but neither of the front nor of the boundary.
+    """
+    solved = np.flatnonzero(np.isfinite(figures.objective) & np.isfinite(figures.nox))
     if not len(solved):
         return None, []
-    front = pareto(figures.fuel, figures.nox)
+    front = pareto(_following(figures, figures.fuel), figures.nox)
     kept = _points(figures, groups, front)
     edge = _boundary(figures, float(figures.nox[solved].min()), float(figures.nox[solved].max()))
+    following = kept[~figures.short[kept]]
     plane = {
         "groups": [
-            {"label": group.label} | _places(figures, np.intersect1d(kept, group.members))
+            {"label": group.label} | _places(figures, np.intersect1d(following, group.members))
             for group in groups
         ],
+        "short": _places(figures, kept[figures.short[kept]]),
+        "pruned": _pruned_places(figures, pruned),
         "front": _places(figures, front),
         "edge": None if edge is None else {"nox": edge.edge.nox.tolist(), "fuel": edge.edge.fuel.tolist()},
     }  # fmt: skip
-    return plane, _plane_words(figures, edge, len(kept), len(solved))
+    words = _plane_words(figures, edge, len(kept), len(solved))
+    return plane, [*words, *_unproven_words(figures, len(pruned))]
+
+
+def _following(figures: Figures, values: Array) -> Array:
+    return np.where(figures.short, np.nan, values)
+
+
+def _pruned_places(figures: Figures, pruned: Sequence[Pruned]) -> dict[str, Any]:
+    """Points of the edges of pruned designs' half planes, at the NOx of the designs that they lost to."""
+    first = sorted(pruned, key=lambda p: (p.bound / p.objective, p.design))[:POINTS_MAX]
+    place = {int(number): n for n, number in enumerate(figures.number)}
+    own = np.array([place[p.design] for p in first], dtype=np.intp)
+    nox = figures.nox[[place[p.incumbent] for p in first]] if first else np.empty(0)
+    bound = np.array([p.bound for p in first])
+    fuel = bound - figures.weight[own] * (figures.fuel_per_nox or 0.0) * nox
+    return {
+        "design": figures.number[own].tolist(),
+        "weight": figures.weight[own].tolist(),
+        "fuel": _rounded(fuel),
+        "nox": _rounded(nox),
+        "merit": _rounded(bound),
+    }
+
+
+def _unproven_words(figures: Figures, pruned: int) -> list[str]:
+    """What designs that do not follow the cycle, and those pruned, do to the picture."""
+    words = []
+    if figures.short.any():
+        words.append(
+            "Crosses: designs that do not follow the cycle; neither the front nor the line is about them."
+        )
+    if pruned:
+        shown = "" if pruned <= POINTS_MAX else f" (the {POINTS_MAX} closest calls of {pruned})"
+        words.append(
+            f"Hollow marks: pruned designs{shown}, by their bound alone: the least fuel of such a design, had it "
+            "the NOx of the design it lost to. Designs were pruned on the objective alone, so the front is "
+            "incomplete: a pruned design could lie on it with other NOx."
+        )
+    return words
 
 
 def _plane_words(figures: Figures, edge: Boundary | None, shown: int, solved: int) -> list[str]:
     """What is proven about fuel and NOx, and what is not; which points are drawn."""
-    bounded = np.isfinite(figures.bound)
+    bounded = np.isfinite(_following(figures, figures.bound))
     weights = np.unique(figures.weight[bounded])
-    words = ["No design has a bound."]
+    words = [f"No design {'that follows the cycle ' if figures.short.any() else ''}has a bound."]
     if edge is not None:
+        whose = "has a bound and follows the cycle" if figures.short.any() else "has a bound"
         words = [
-            "The thick line is proven: no plan of a design with a bound lies left of it or below."
+            f"The thick line is proven: no plan of a design that {whose} lies left of it or below."
         ]
         if len(weights) > 1:
             words.append(
@@ -107,7 +156,7 @@ def _plane_words(figures: Figures, edge: Boundary | None, shown: int, solved: in
                 "Where a plan found under one weight leaves less charge than the bound at another supposes, that "
                 f"bound was lowered to it, by {edge.lowered:.2g} l/100 km at most."
             )
-    unbounded = int((~bounded).sum())
+    unbounded = int(np.isnan(figures.bound).sum())
     if edge is not None and unbounded:
         words.append(
             f"Nothing is proven about {unbounded} design{'s' if unbounded > 1 else ''} without a bound."
@@ -147,7 +196,7 @@ def _parameter(key: str, figures: Figures) -> dict[str, Any]:
 
 def _lines(figures: Figures, group: Group) -> dict[str, Any]:
     """The designs drawn as lines: all, or the best and of the others every so many-th by rank; the best last."""
-    ranked = group.ranked
+    ranked = group.ranked[~figures.short[group.ranked]]
     if len(ranked) > LINES_MAX:
         rest = np.linspace(BEST_LINES, len(ranked) - 1, LINES_MAX - BEST_LINES)
         ranked = ranked[np.r_[np.arange(BEST_LINES), rest.round().astype(int)]]
@@ -158,7 +207,7 @@ def _lines(figures: Figures, group: Group) -> dict[str, Any]:
         "fuel": _rounded(figures.fuel[ranked]),
         "nox": _rounded(figures.nox[ranked]),
         "merit": _rounded(figures.merit[ranked]),
-        "all": len(group.ranked),
+        "all": int((~figures.short[group.ranked]).sum()),
     }
 
 
@@ -183,7 +232,7 @@ def _places(figures: Figures, chosen: Indices) -> dict[str, Any]:
 
 def _points(figures: Figures, groups: Sequence[Group], front: Indices) -> Indices:
     """The designs drawn as points: all, or the best of each group in every cell, the listed and the front."""
-    solved = np.flatnonzero(np.isfinite(figures.objective))
+    solved = np.flatnonzero(np.isfinite(figures.objective) & np.isfinite(figures.nox))
     if len(solved) <= POINTS_MAX:
         return solved
     cells = np.zeros(len(figures.number), dtype=np.int64)
@@ -204,7 +253,7 @@ def _boundary(figures: Figures, least: float, most: float) -> Boundary | None:
     margin = _MARGIN * ((most - least) or most or 1.0)
     ends = (max(least - margin, 0.0), most + margin)
     per_nox = figures.fuel_per_nox
-    bounds = figures.bound
+    bounds = _following(figures, figures.bound)
     if per_nox is None:
         bounds = np.where(figures.weight > 0, np.nan, bounds)
     weights, column = np.unique(figures.weight, return_inverse=True)
@@ -215,6 +264,8 @@ def _boundary(figures: Figures, least: float, most: float) -> Boundary | None:
     texts = zip(*(figures.values[key] for key in keys), strict=True)
     row = [cars.setdefault(text, len(cars)) for text in texts] or list(range(len(column)))
     matrices = np.full((3, max(row) + 1, len(weights)), np.nan)
-    for matrix, values in zip(matrices, (bounds, figures.fuel, figures.nox), strict=True):
+    for matrix, values in zip(
+        matrices, (bounds, _following(figures, figures.fuel), figures.nox), strict=True
+    ):
         matrix[row, column] = values
     return boundary(weights * (per_nox or 0.0), *matrices, ends)

@@ -21,8 +21,10 @@ class Effect:
     """The objective over the values of one parameter; lists are (value or bin,), in ascending order.
 
     values: numbers (of a bin, its middle) or texts; low, high: ends of the bin, the value itself where it is none
+    best: least objective; floor: least bound of designs that were pruned; None where there are none
+    mean: None where a design was pruned: those left are the better ones, more so at some values than at others
     share: of the objective's variance, what lies between the values' means (correlation ratio, eta squared);
-    chance: what unrelated random values would reach on average. None where nothing varies.
+    chance: what unrelated random values would reach on average. None where nothing varies, or designs were pruned
     """
 
     key: str
@@ -32,8 +34,9 @@ class Effect:
     values: list[float] | list[str]
     low: list[Any]
     high: list[Any]
-    mean: list[float]
-    best: list[float]
+    mean: list[float] | None
+    best: list[float | None]
+    floor: list[float | None]
     count: list[int]
     share: float | None
     chance: float | None
@@ -50,8 +53,13 @@ def is_log(values: Sequence[float]) -> bool:
     return low > 0 and high / low >= _LOG_SPAN
 
 
-def effect(key: str, values: Sequence[Any], objective: Array) -> Effect:
-    """The effect of a parameter on the objective, both of one entry per design."""
+def effect(
+    key: str, values: Sequence[Any], objective: Array, pruned: Sequence[tuple[Any, float]] = ()
+) -> Effect:
+    """The effect of a parameter on the objective, both of one entry per design. pruned: others' value, bound"""
+    solved = len(objective)
+    values = [*values, *(value for value, _ in pruned)]
+    whole = np.array([*objective, *(bound for _, bound in pruned)])
     numeric = is_numeric(values)
     log = numeric and is_log(values)
     distinct = sorted(set(values)) if numeric else list(dict.fromkeys(values))
@@ -66,15 +74,16 @@ def effect(key: str, values: Sequence[Any], objective: Array) -> Effect:
         at = {value: n for n, value in enumerate(distinct)}
         place = np.array([at[value] for value in values])
         shown = low = high = distinct if numeric else [_text(value) for value in distinct]
-    groups = [objective[place == n] for n in range(len(shown))]
-    used = [n for n, group in enumerate(groups) if len(group)]
-    groups = [groups[n] for n in used]
-    share, chance = _share(groups, objective)
+    used = np.unique(place).tolist()
+    groups = [objective[place[:solved] == n] for n in used]
+    floors = [whole[solved:][place[solved:] == n] for n in used]
+    share, chance = (None, None) if pruned else _share(groups, objective)
     return Effect(
         key, numeric, binned, log,
         *([of[n] for n in used] for of in (shown, low, high)),
-        [float(group.mean()) for group in groups],
-        [float(group.min()) for group in groups],
+        None if pruned else [float(group.mean()) for group in groups],
+        [float(group.min()) if len(group) else None for group in groups],
+        [float(floor.min()) if len(floor) else None for floor in floors],
         [len(group) for group in groups],
         share, chance,
     )  # fmt: skip

@@ -73,10 +73,11 @@ def _first(results: Results, best: RowFigures, equal: list[RowFigures]) -> str:
         less = "less" if best.delta_fuel_percent <= 0 else "more"
         change = f", {abs(best.delta_fuel_percent):.1f} % {less} than {results.reference}"
     doubt = "" if best.status == "ok" else "; no row is free of alerts, see below"
-    co2 = f"{best.co2_g_per_km:.1f} g CO2/km, {best.nox_mg_per_km:.0f} mg NOx/km"
+    known = best.nox_mg_per_km is not None
+    nox = f"{best.nox_mg_per_km:.0f} mg NOx/km" if known else "NOx unknown"
     return (
         f"On {results.cycle}, {best.architecture} with {best.strategy} needs the least {what}{also}: {sum_of}"
-        f"{best.fuel_l_per_100km:.4f} l/100 km ({co2}){change}{doubt}."
+        f"{best.fuel_l_per_100km:.4f} l/100 km ({best.co2_g_per_km:.1f} g CO2/km, {nox}){change}{doubt}."
     )
 
 

@@ -1,12 +1,27 @@
 """The page of the reproduction, Markdown: every figure in it comes from a Reproduction, none is typed."""
 
-from collections.abc import Sequence
-
-from hevopt.published import CYCLE, HYBRIDS, STATEMENTS, WHEEL_WORK_MJPKM, percent
+from hevopt.published import (
+    CYCLE,
+    HYBRIDS,
+    MEAN_NOX_WITHOUT_C1,
+    STATEMENTS,
+    WHEEL_WORK_MJPKM,
+    Statement,
+    percent,
+)
 from hevopt.reproduction import sections
-from hevopt.reproduction.cases import JOINT, Reproduction, Under, least_penalty
-from hevopt.reproduction.verdicts import markdown, off_text, points_off, signed, standing, star
-from hevopt.rows import NEUTRAL_PERCENT
+from hevopt.reproduction.cases import JOINT, NEUTRAL_WORTH_PERCENT, Reproduction, least_penalty
+from hevopt.reproduction.details import members_of
+from hevopt.reproduction.verdicts import (
+    driven,
+    markdown,
+    off_text,
+    points_off,
+    signed,
+    standing,
+    star,
+    starred,
+)
 from hevopt.study import Comparison
 
 COMMAND = "hevopt reproduction --out reports/reproduction.md"
@@ -32,6 +47,7 @@ def page(found: Reproduction) -> str:
 
 
 def _head() -> str:
+    share = f"{NEUTRAL_WORTH_PERCENT:g} %"
     whole, about = min(s.rounding for s in STATEMENTS), max(s.rounding for s in STATEMENTS)
     return f"""# The published study beside ours
 
@@ -42,25 +58,24 @@ The study: F. Millo, L. Rolando, M. Andreata, *Numerical Simulation for Vehicle 
 Changes are against the conventional car A unless a table says otherwise. Ours is tuned to nothing on this page:
 the cars are the shipped files, the strategies the shipped rules. Fuel is charge-corrected.
 
-Each section changes one assumption at a time, in A as well where A has it, solves and calibrates everything
-afresh, and says what that moves. *Reached* means within the rounding of the published figure: {whole:g} points,
+Each section changes one assumption at a time, in A as well where A has it (A's alternator keeps its efficiency but
+where that itself is changed), solves and calibrates everything afresh, and says what that moves.
+
+*Reached* means within the rounding of the published figure: {whole:g} points,
 or {about:g} where the text says "about". *Passed* means beyond it, so that less of the same change would reach it.
 What reaches a figure can explain it; that it does would need the study's own assumptions, which its text does not
-give. A star marks what is not neutral, its end charge off by more than {NEUTRAL_PERCENT:g} % of the fuel's energy;
-it is corrected like the rest."""
+give. A star marks what is not neutral: its end charge is worth more than {share} of its fuel, or the charge left
+its window on the way. Fuel is corrected there as everywhere, NOx nowhere; under each table with stars, another says
+how far the end charge is above (+) or below (-) the start's and what the change is as driven, without correction.
+What as driven does not reach the published figure is *reached only after correction*."""
 
 
 def _points(found: Reproduction) -> str:
     rows = []
     for statement, section in zip(STATEMENTS, sections.SECTION_OF, strict=True):
-        ours = statement.ours(found.shipped.cases)
-        explained = standing(statement, found, sections.others_of(section, found))
-        rows.append([statement.what, statement.published, f"{signed(ours)} %",
-                     off_text(statement, ours), explained, _link(section)])  # fmt: skip
+        rows.append(_point(statement, statement.what, section, found))
         if statement is _MEAN_NOX:
-            ours = _mean_nox(found.shipped, HYBRIDS[1:])
-            rows.append(["the same without C1", statement.published, f"{signed(ours)} %",
-                         off_text(statement, ours), "", _link(section)])  # fmt: skip
+            rows.append(_point(MEAN_NOX_WITHOUT_C1, "the same without C1", section, found))
     work = found.work_mjpkm["A as shipped"]
     same = round(work, 1) == WHEEL_WORK_MJPKM
     off = "within rounding" if same else f"{signed(work - WHEEL_WORK_MJPKM, 3)} MJ/km"
@@ -77,10 +92,11 @@ def _link(section: int) -> str:
     return f"[{sections.TITLES[section]}]({sections.anchor(section)})"
 
 
-def _mean_nox(under: Under, cars: Sequence[str]) -> float:
-    base = under.cases["A", "baseline"].nox_mg_per_km
-    changes = [percent(under.cases[car, "conventional"].nox_mg_per_km, base) for car in cars]
-    return sum(changes) / len(changes)
+def _point(statement: Statement, what: str, section: int, found: Reproduction) -> list[str]:
+    ours = statement.ours(found.shipped.cases)
+    explained = standing(statement, found, sections.others_of(section, found))
+    off = off_text(statement, ours)
+    return [what, statement.published, f"{signed(ours)} %", off, explained, _link(section)]
 
 
 def _ranking(comparison: Comparison) -> str:
@@ -126,7 +142,15 @@ def _joint(found: Reproduction) -> str:
         for s in STATEMENTS
     ]
     off = [[points_off(s, s.ours(u.cases)) for s in STATEMENTS] for u in unders]
-    rows.append(["reached", "", *(f"{sum(not o for o in offs)} of {len(offs)}" for offs in off)])
+    firm = [[not points_off(s, driven(u, s)) for s in STATEMENTS] for u in unders]
+    counts = [
+        (sum(not o and f for o, f in zip(offs, firms, strict=True)), sum(not o for o in offs))
+        for offs, firms in zip(off, firm, strict=True)
+    ]
+    rows.append(["reached", "", *(f"{sure} of {len(STATEMENTS)}" for sure, _ in counts)])
+    rows.append(
+        ["reached only after correction", "", *(f"{every - sure}" for sure, every in counts)]
+    )
     left = [f"{s.what} ({signed(o)} points)" for s, o in zip(STATEMENTS, off[-1], strict=True) if o]
     heads = ["point, %", "published", *(under.name for under in unders)]
     text = (
@@ -135,6 +159,7 @@ def _joint(found: Reproduction) -> str:
     )
     return (
         f"## 7. Together\n\n{text}\n\n" + markdown(heads, "ll" + "r" * len(unders), rows)
+        + "\n\n" + starred(unders, STATEMENTS)
         + f"\n\nNot explained by the last column: {'; '.join(left) or 'nothing'}. Nothing of it is "
         "taken over: files and rules stay as they are."
     )  # fmt: skip
@@ -144,20 +169,21 @@ def _own_rules(found: Reproduction) -> str:
     """What the differences show about our own rules."""
     rows = []
     for car in HYBRIDS:
-        members = found.curves[car]
+        members = members_of(car, found)
         best = min(members, key=lambda m: m.fuel_percent)
         neutral = min(m.fuel_percent for m in members if m.neutral)
         rows.append([car, f"{sum(not m.neutral for m in members)} of {len(members)}", signed(neutral),
                      signed(best.fuel_percent) + ("" if best.neutral else "*"),
                      _or_dash(least_penalty(found.families[car], 0))])  # fmt: skip
-    heads = ["car", "members of the curve that are not neutral", "fuel of the best neutral one, %",
+    heads = ["car", "members that are not neutral", "fuel of the best neutral one, %",
              "fuel of the best of all, %", "least fuel of `nox_cut` against `conventional`, %"]  # fmt: skip
     text = (
         "`conventional` shifts the engine's load upwards only. Where braking gives back more "
         "than a low threshold uses, it cannot spend the rest: such members are not neutral, and "
-        "the calibration passes them over. `nox_cut` may assist; where a member of its family "
-        "burns less than `conventional`, as in the last column, `conventional` is not the best "
-        "rule of its kind."
+        "the calibration passes them over. The members are those of the table in section 2, the "
+        "calibrated one included; what the stars stand for is said there. `nox_cut` may assist; "
+        "where a member of its family burns less than `conventional`, as in the last column, "
+        "`conventional` is not the best rule of its kind."
     )
     return f"## 8. What this shows of our own rules\n\n{text}\n\n" + markdown(heads, "lrrrr", rows)
 

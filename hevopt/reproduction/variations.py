@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from hevopt.powertrain import build_problem
 from hevopt.problem import Problem, Reject
 from hevopt.units import KMH_PER_MPS
 
-LOSS_FACTOR, RESISTANCE_FACTOR, HYBRID_MASS_FACTOR = 1.5, 2.0, 2.0
+LOSS_FACTOR, LESS_LOSS_FACTOR, RESISTANCE_FACTOR, HYBRID_MASS_FACTOR = 1.5, 0.5, 2.0, 2.0
 DRIVELINE_LOSS_ADDED = 0.03
 AUXILIARIES_W = 400.0
 START_FUEL_G = 1.0
@@ -46,13 +46,28 @@ class Variation:
         )
 
 
-def varied(
-    architecture: str, cycle: Cycle, variation: Variation
-) -> tuple[Architecture, Cycle, Problem]:
+class Varied(NamedTuple):
+    """A car, a cycle and their problem under a variation; touched: whether any of them is another by it."""
+
+    car: Architecture
+    cycle: Cycle
+    problem: Problem
+    touched: bool
+
+
+def varied(architecture: str, cycle: Cycle, variation: Variation) -> Varied:
     """A shipped architecture, a cycle and their problem under a variation."""
-    car = load_architecture(architecture, dict(variation.changes(load_architecture(architecture))))
-    cycle = variation.cycle(cycle)
-    return car, cycle, variation.problem(build_problem(car, cycle))
+    shipped = load_architecture(architecture)
+    car = load_architecture(architecture, dict(variation.changes(shipped)))
+    changed = variation.cycle(cycle)
+    built = build_problem(car, changed)
+    problem = variation.problem(built)
+    touched = (
+        car.contents != shipped.contents
+        or not np.array_equal(changed.gear, cycle.gear)
+        or not np.array_equal(problem.table.reject, built.table.reject)
+    )
+    return Varied(car, changed, problem, touched)
 
 
 def neutral_at_standstill(cycle: Cycle) -> Cycle:
@@ -100,6 +115,33 @@ def _times(car: Architecture, component: str, keys: tuple[str, ...], factor: flo
     return {f"{component}.{key}": factor * table[key] for key in keys if key in table}
 
 
+def _machine_loss(factor: float) -> Callable[[Architecture], dict[str, float]]:
+    """The machine's loss times a factor; A's alternator is left to ALTERNATOR."""
+
+    def changes(car: Architecture) -> dict[str, float]:
+        efficiency = car.contents["machine"].get("efficiency")
+        if efficiency is None:
+            return _times(car, "machine", _LOSSES, factor)
+        if car.coupling.kind == "none":
+            return {}
+        return {"machine.efficiency": less_loss(efficiency, factor)}
+
+    return changes
+
+
+def _charging_loss(factor: float) -> Callable[[Architecture], dict[str, float]]:
+    return lambda car: {
+        "battery.coulombic_efficiency": less_loss(
+            car.contents["battery"]["coulombic_efficiency"], factor
+        )
+    }
+
+
+def less_loss(efficiency: float, factor: float) -> float:
+    """The efficiency whose distance from 1 is `factor` times as large."""
+    return 1 - factor * (1 - efficiency)
+
+
 def _driveline(car: Architecture) -> dict[str, float]:
     changes = {"gearbox.efficiency": car.contents["gearbox"]["efficiency"] - DRIVELINE_LOSS_ADDED}
     own = car.contents["coupling"].get("machine_efficiency")
@@ -121,6 +163,8 @@ def _road(car: Architecture) -> dict[str, float]:
 
 
 def _no_recovery(car: Architecture) -> dict[str, list[str]]:
+    if "regenerative_braking" not in car.functions:
+        return {}
     return {"functions": sorted(car.functions - {"regenerative_braking"})}
 
 
@@ -132,8 +176,13 @@ DEAR_STARTS = Variation(
 )
 NO_INERTIA = Variation("no engine inertia", lambda car: {"engine.inertia_kgm2": 0.0})
 DRIVELINE = Variation(f"driveline efficiency less {DRIVELINE_LOSS_ADDED:g}", _driveline)
-MACHINE_LOSS = Variation(
-    f"machine loss x {LOSS_FACTOR:g}", lambda car: _times(car, "machine", _LOSSES, LOSS_FACTOR)
+MACHINE_LOSS, LESS_MACHINE_LOSS = (
+    Variation(f"machine loss x {factor:g}", _machine_loss(factor))
+    for factor in (LOSS_FACTOR, LESS_LOSS_FACTOR)
+)
+CHARGING_LOSS, LESS_CHARGING_LOSS = (
+    Variation(f"coulombic loss x {factor:g}", _charging_loss(factor))
+    for factor in (LOSS_FACTOR, LESS_LOSS_FACTOR)
 )
 RESISTANCE = Variation(
     f"battery resistance x {RESISTANCE_FACTOR:g}",

@@ -1,6 +1,7 @@
 """What brings ours to a published figure, and what is left where nothing does; and tables in Markdown."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from hevopt.published import STATEMENTS, Statement
 from hevopt.reproduction.cases import Member, Reproduction, Under
@@ -11,9 +12,26 @@ _OF_FAMILY = {
     STATEMENTS[6].what: ("D", "fuel_percent"),
     STATEMENTS[7].what: ("E", "nox_percent"),
 }
+_STRATEGIES = ("start_stop", "conventional", "nox_cut")
 
 
-_Value = tuple[str, float]
+class _Value(NamedTuple):
+    """A statement under a variation, per cent; driven: as driven; star: "*" where a case is not neutral."""
+
+    name: str
+    value: float
+    driven: float
+    star: str
+
+
+class _Sorted(NamedTuple):
+    """Values that reach what is published and that pass it; only_corrected: as driven they do not."""
+
+    values: list[_Value]
+    reached: list[_Value]
+    passed: list[_Value]
+    reached_only_corrected: list[_Value]
+    passed_only_corrected: list[_Value]
 
 
 def points_off(statement: Statement, ours: float) -> float:
@@ -29,48 +47,93 @@ def off_text(statement: Statement, ours: float) -> str:
     return f"{signed(off)} points" if off else "within rounding"
 
 
+def cases_in(statement: Statement) -> list[tuple[str, str]]:
+    """The cases that a statement speaks of, without A."""
+    return [(car, name) for car in statement.cars for name in _STRATEGIES if name in statement.what]
+
+
+def applies(under: Under, statement: Statement) -> bool:
+    """Whether the variation changes anything in a car that the statement is worked out from."""
+    against_a = "over" not in statement.what
+    return not {*statement.cars, *(["A"] if against_a else [])} <= under.untouched
+
+
+def driven(under: Under, statement: Statement) -> float:
+    """The statement as driven where a case of it is not neutral, otherwise as it is."""
+    return statement.ours(under.driven if star(under, statement) else under.cases)
+
+
 def verdict(statement: Statement, found: Reproduction, others: Iterable[Under]) -> str:
     """Which variations bring ours to what is published, or what is left unexplained."""
     off = points_off(statement, statement.ours(found.shipped.cases))
     if not off:
         return "ours is what is published, to its rounding."
-    values, reached, passed = _sorted(statement, found, others)
+    by = _sorted(statement, found, others)
+    parts = (
+        ("Reached with", by.reached),
+        ("Passed with", by.passed),
+        ("Reached only after correction with", by.reached_only_corrected),
+        ("Passed only after correction with", by.passed_only_corrected),
+    )
     text = f"{signed(off)} points off."
-    text += f" Reached with: {_listed(reached)}." if reached else ""
-    text += f" Passed with: {_listed(passed)}." if passed else ""
+    text += "".join(f" {how}: {'; '.join(map(_shown, of))}." for how, of in parts if of)
     milder = _milder(statement, found.families)
-    if reached or passed or milder:
+    if milder or any(of for _, of in parts):
         return text + milder
-    name, value = min(values, key=lambda pair: abs(points_off(statement, pair[1])))
-    left = signed(points_off(statement, value))
-    return f"{text} Not explained: the closest, {name}, gives {signed(value)} % and leaves {left} points."
+    closest = min(by.values, key=lambda value: abs(points_off(statement, value.value)))
+    left = signed(points_off(statement, closest.value))
+    return f"{text} Not explained: the closest, {_shown(closest)}, leaves {left} points."
 
 
 def standing(statement: Statement, found: Reproduction, others: Iterable[Under]) -> str:
-    """The verdict in a word or two."""
+    """The verdict in a few words."""
     if not points_off(statement, statement.ours(found.shipped.cases)):
         return "agrees"
-    _, reached, passed = _sorted(statement, found, others)
-    if reached:
+    by = _sorted(statement, found, others)
+    if by.reached:
         return "reached by a variation"
     if _milder(statement, found.families):
         return "reached by a milder cut"
-    return "passed by a variation" if passed else "**not explained**"
+    passed = "passed by a variation" if by.passed else ""
+    if not passed and by.passed_only_corrected:
+        passed = "passed only after correction"
+    reached = "reached only after correction" if by.reached_only_corrected else ""
+    return ", ".join(text for text in (reached, passed) if text) or "**not explained**"
 
 
-def _sorted(
-    statement: Statement, found: Reproduction, others: Iterable[Under]
-) -> tuple[list[_Value], list[_Value], list[_Value]]:
-    """Name and value under each variation: all, those that reach the published figure, those that pass it."""
+def _sorted(statement: Statement, found: Reproduction, others: Iterable[Under]) -> _Sorted:
     off = points_off(statement, statement.ours(found.shipped.cases))
-    values = [(under.name, statement.ours(under.cases)) for under in others]
-    reached = [pair for pair in values if not points_off(statement, pair[1])]
-    passed = [pair for pair in values if points_off(statement, pair[1]) * off < 0]
-    return values, reached, passed
+    values = [
+        _Value(
+            under.name,
+            statement.ours(under.cases),
+            driven(under, statement),
+            star(under, statement),
+        )
+        for under in others
+        if applies(under, statement)
+    ]
+
+    def reaches(value: float) -> bool:
+        return not points_off(statement, value)
+
+    def passes(value: float) -> bool:
+        return points_off(statement, value) * off < 0
+
+    reached = [v for v in values if reaches(v.value)]
+    passed = [v for v in values if passes(v.value)]
+    return _Sorted(
+        values,
+        [v for v in reached if reaches(v.driven)],
+        [v for v in passed if passes(v.driven)],
+        [v for v in reached if not reaches(v.driven)],
+        [v for v in passed if not passes(v.driven)],
+    )
 
 
-def _listed(values: Sequence[_Value]) -> str:
-    return "; ".join(f"{name} ({signed(value)} %)" for name, value in values)
+def _shown(value: _Value) -> str:
+    as_driven = f", as driven {signed(value.driven)} %" if value.driven != value.value else ""
+    return f"{value.name} ({signed(value.value)} %{value.star}{as_driven})"
 
 
 def _milder(statement: Statement, families: Mapping[str, Sequence[Member]]) -> str:
@@ -96,9 +159,26 @@ def _range(values: Sequence[float]) -> str:
 
 def star(under: Under, statement: Statement) -> str:
     """A star where a case that the statement speaks of is not neutral."""
-    names = ("conventional", "nox_cut") if "over" in statement.what else ("conventional",)
-    off = any((car, name) in under.off for car in statement.cars for name in names)
-    return "*" if off else ""
+    return "*" if any(case in under.surplus_percent for case in cases_in(statement)) else ""
+
+
+def starred(unders: Iterable[Under], statements: Iterable[Statement]) -> str:
+    """A table of what the stars stand for: how far the end charge is off, and ours as driven; "" without any."""
+    rows = []
+    pairs = ((u, s) for u in unders for s in statements if star(u, s) and applies(u, s))
+    for under, statement in pairs:
+        sizes = "; ".join(
+            f"{' '.join(case)} {signed(under.surplus_percent[case])}"
+            for case in cases_in(statement)
+            if case in under.surplus_percent
+        )
+        values = (statement.ours(under.cases), driven(under, statement))
+        rows.append([under.name, statement.what, sizes, *(signed(value) for value in values)])
+    if not rows:
+        return ""
+    heads = ["starred under", "point", "end charge off, % of the fuel's energy", "as above, %",
+             "as driven, %"]  # fmt: skip
+    return markdown(heads, "lllrr", rows)
 
 
 def signed(value: float, digits: int = 1) -> str:

@@ -22,7 +22,7 @@ from typing import Any
 from hevopt.errors import SolverError
 from hevopt.sweeps.jobs import Job, Outcome
 
-READY, REFUSED, CASE, DONE = "ready", "refused", "case", "done"
+READY, REFUSED, DIFFERS, CASE, DONE = "ready", "refused", "differs", "case", "done"
 Work = Callable[..., list[Outcome]]
 # The kernel's prctl(2): a signal for this process when the one that started it ends.
 _PR_SET_PDEATHSIG = 1
@@ -55,6 +55,12 @@ def code_digest() -> str:
     return digest({"code": physics_digest(), "versions": versions()})
 
 
+class CodeDiffers(SolverError):
+    """A worker's code is not what the sweep began with; what was solved before is stored."""
+
+    exit_status = 4
+
+
 def main() -> None:
     """Serve the worker at the other end of the pipe until it goes, or is silent for a minute."""
     descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
@@ -65,7 +71,8 @@ def main() -> None:
             work = resolve_name(terms.work)
             _accept(terms)
         except Exception as error:
-            pipe.send((REFUSED, str(error) or type(error).__name__))
+            kind = DIFFERS if isinstance(error, CodeDiffers) else REFUSED
+            pipe.send((kind, str(error) or type(error).__name__))
             return
         pipe.send((READY, None))
         bench = _Bench(pipe, terms, work)
@@ -85,9 +92,10 @@ def _end_with(parent: int) -> None:
 
 def _accept(terms: Terms) -> None:
     if terms.code is not None and terms.code != code_digest():
-        raise SolverError(
+        raise CodeDiffers(
             "its hevopt, Python or libraries are not those that this process started with; install the same "
-            "everywhere, change nothing while a sweep runs, and run the same command again"
+            "everywhere, change nothing while a sweep runs, and run the same command again: all results so far are "
+            "stored"
         )
     if terms.memory_mb is not None:
         limit, hard = int(terms.memory_mb * 2**20), resource.getrlimit(resource.RLIMIT_AS)[1]

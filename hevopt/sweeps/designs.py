@@ -99,6 +99,23 @@ def car_of(study: SweepStudy, design: Design) -> Architecture:
         ) from None
 
 
+def cars_of(study: SweepStudy, designs: Designs) -> Iterator[Architecture]:
+    """Cars of some designs that are made of all the files that any is: only texts name components."""
+    texts = [n for n, of in enumerate(designs.levels) if isinstance(of[0], str)]
+    found = np.unique(designs.codes[:, texts], axis=0, return_index=True)[1] if texts else [0]
+    for number in found:
+        yield car_of(study, designs[int(number)])
+
+
+def merged_values(study: SweepStudy) -> dict[str, tuple[int, int]]:
+    """Key -> how many values a range asks for, and how many distinct ones there are where that is fewer."""
+    asked = {
+        key: v.count for key, v in study.parameters.items() if isinstance(v, Range) and v.count
+    }
+    distinct = {key: len(_levels(study.parameters[key])) for key in asked}
+    return {key: (count, distinct[key]) for key, count in asked.items() if distinct[key] < count}
+
+
 def groups_of(
     designs: Iterable[Design],
 ) -> list[tuple[dict[str, Scalar], list[tuple[int, float]]]]:

@@ -2,19 +2,24 @@
 
 import csv
 import io
-from collections.abc import Iterator
-from itertools import islice
+from collections.abc import Iterator, Mapping
+from itertools import groupby, islice
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from hevopt.errors import DataError
 from hevopt.files import printable
-from hevopt.sweeps.jobs import NOX_WEIGHT
+from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
+from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.reading import OUTCOMES, Reader
 from hevopt.writing import check_writable, write_whole
 
 _LEADING = ("design", "cycle", "strategy", "outcome")
-_LAST = ("error", "solve_s")
+_PRUNED = ("design_bound_l_per_100km", "incumbent", "incumbent_objective_l_per_100km")
+_LAST = ("error", "case_s")
+# Of a row: the strategy is told before, and a sweep has no reference for changes.
+_LEFT_OUT = ("strategy", "delta_fuel_percent", "delta_nox_percent")
 # Lines that a part of a Parquet file has, so that memory holds few of them.
 _GROUP = 10_000
 
@@ -37,7 +42,9 @@ def check_export(path: Path) -> None:
 def export(reader: Reader, path: Path) -> int:
     """Write a line per case, by design, cycle and strategy, parameters and figures as columns; how many lines.
 
-    The text is the same whatever ran the sweep, apart from the column solve_s.
+    The text is the same whatever ran the sweep, apart from the column case_s: seconds of the whole case,
+    the control table and the dynamic program going to the first one that needed them. Cases of pruned designs have
+    their bound, that of the design (mean over the cycles), and the incumbent that condemned it.
     """
     check_export(path)
     write_whole(path, csv_of(reader) if path.suffix == ".csv" else _parquet_of(reader))
@@ -87,7 +94,9 @@ def _kinds(reader: Reader) -> dict[str, type]:
     for line in _lines(reader):
         for name, value in line.items():
             found.setdefault(name, set()).add(type(value))
-    ordered = [name for name in found if name not in _LAST] + list(_LAST)
+    pruned = [name for name in _PRUNED if name in found]
+    last = [*pruned, *_LAST]
+    ordered = [name for name in found if name not in last] + last
     return {name: _kind_of(found.get(name, set()) - {type(None)}) for name in ordered}
 
 
@@ -98,9 +107,22 @@ def _kind_of(kinds: set[type]) -> type:
 
 
 def _lines(reader: Reader) -> Iterator[dict[str, Any]]:
-    for record in reader.records():
-        line = {name: getattr(record, name) for name in _LEADING}
-        line |= record.parameters
-        line[NOX_WEIGHT] = record.nox_weight
-        line |= {k: v for k, v in (record.row or {}).items() if k != "strategy"}
-        yield line | {"error": record.error, "solve_s": record.seconds}
+    condemned = {pruned.design: pruned for pruned in reader.pruned()}
+    for (design, _), found in groupby(reader.records(), attrgetter("design", "cycle")):
+        records = list(found)
+        bound = next((r.row for r in records if r.strategy == BOUND and r.row is not None), {})
+        for record in records:
+            line = {name: getattr(record, name) for name in _LEADING}
+            line |= record.parameters
+            line[NOX_WEIGHT] = record.nox_weight
+            pruned = record.outcome == "pruned"
+            row = _unsolved(bound, condemned[design]) if pruned else record.row or {}
+            line |= {k: v for k, v in row.items() if k not in _LEFT_OUT}
+            yield line | {"error": record.error, "case_s": record.seconds}
+
+
+def _unsolved(bound: Mapping[str, Any], pruned: Pruned) -> dict[str, Any]:
+    """What is known of a case of a pruned design; bound: the row of its bound."""
+    known = {name: bound.get(name) for name in ("architecture", "bound_l_per_100km")}
+    why = zip(_PRUNED, (pruned.bound, pruned.incumbent, pruned.objective), strict=True)
+    return {**dict.fromkeys(bound), **known, **dict(why)}

@@ -67,7 +67,8 @@ class Planned(NamedTuple):
 
 def inputs_digest(car: Architecture, cycle: Cycle) -> str:
     """SHA-256 of everything in the files of a car and a cycle that a result depends on."""
-    return digest([car.contents, _cycle_digest(cycle)])
+    contents = {key: value for key, value in car.contents.items() if key != "description"}
+    return digest([contents, _cycle_digest(cycle)])
 
 
 @lru_cache(maxsize=64)

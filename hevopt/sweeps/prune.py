@@ -1,18 +1,22 @@
 """Which designs to solve, and which to discard unsolved because their bound is worse than a solved design.
 
-Designs of one NOx weight compete; each weight has an incumbent of its own, the best objective so far. In every
-round each weight gives its next designs in order of their bound. Before a round, designs whose bound is above
-the incumbent's objective are discarded: whatever their plans, they are strictly worse. What is discarded depends
-on bounds and objectives alone, neither on the order they came in nor on how many workers there are.
+Designs of one NOx weight compete; each weight has an incumbent of its own, the best objective so far of designs
+that follow their cycles. In every round each weight gives its next designs in order of their bound. Before a round,
+designs whose bound is above the incumbent's objective are discarded: whatever their plans, they are strictly worse.
+What is discarded depends on bounds and objectives alone, neither on the order they came in nor on how many workers
+there are.
 """
 
 from bisect import bisect_right
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from math import fsum, inf, isfinite
+from typing import Any
 
-# Designs of one weight in a round: enough to keep some dozen workers busy, few enough to be few too many.
-WAVE = 32
+# Designs of one weight in a round, the last size for ever: few at first, so that an incumbent spares most of a
+# small study; later enough to keep some dozen workers busy, few enough to be few too many.
+WAVES = (4, 8, 16, 32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +63,25 @@ def mean_objective(objectives: Sequence[Sequence[float | None]]) -> float | None
     return _mean(best)
 
 
-def search(designs: Iterable[Bounded], wave: int = WAVE) -> Search:
-    """Yields waves; each expects, sent back, design -> objective of the wave's designs, None where it failed.
+def follows(rows: Iterable[Mapping[str, Any] | None]) -> bool:
+    """Whether a design follows its cycles, by what rows of it there are: no step with less than the cycle asks."""
+    return not any("shortfall" in row.get("status", "") for row in rows if row is not None)
 
-    A design without a bound, because it failed or is infeasible, is solved all the same: its error is on record.
+
+def search(designs: Iterable[Bounded], sizes: Sequence[int] = WAVES) -> Search:
+    """Yields waves; each expects, sent back, design -> objective of the wave's designs.
+
+    The objective is None where a design failed or does not follow a cycle: it condemns no other. A design without
+    a bound, because it failed or is infeasible, is solved all the same: its error is on record. sizes: how many
+    designs of a weight each wave takes, the last for all later ones.
     """
     groups: dict[float, _Group] = {}
     for given in sorted(designs, key=_order):
         groups.setdefault(given.nox_weight, _Group([])).queue.append(given)
-    while any(group.queue for group in groups.values()):
+    for turn in count():
+        if not any(group.queue for group in groups.values()):
+            return
+        wave = sizes[min(turn, len(sizes) - 1)]
         pruned = [discarded for group in groups.values() for discarded in group.discard()]
         taken = [(group, given) for group in groups.values() for given in group.take(wave)]
         objectives = yield Wave(tuple(given.design for _, given in taken), tuple(pruned))

@@ -7,7 +7,7 @@ from math import inf
 from operator import attrgetter
 from typing import Any
 
-from hevopt.sweeps.prune import mean_bound, mean_objective
+from hevopt.sweeps.prune import follows, mean_bound, mean_objective
 from hevopt.sweeps.reading import Reader, Record
 
 
@@ -16,6 +16,7 @@ class Ranked:
     """A design's figures, means over the cycles; objective: None where bounds are all there is.
 
     bound: of the best plans' objective, charge-corrected as they are, or else for the charge asked at the end
+    follows: False where a step of a cycle is driven with less than it asks
     """
 
     design: int
@@ -23,10 +24,14 @@ class Ranked:
     nox_weight: float
     objective: float | None
     bound: float | None
+    follows: bool
 
 
 def best_designs(reader: Reader, count: int) -> dict[float, list[Ranked]]:
-    """NOx weight -> its best designs, the best first: designs of different weights have no common objective."""
+    """NOx weight -> its best designs, the best first, those that do not follow a cycle after all others.
+
+    Designs of different weights have no common objective.
+    """
     best: dict[float, list[Ranked]] = {}
     for ranked in _ranked(reader):
         if ranked.objective is not None or ranked.bound is not None:
@@ -37,9 +42,10 @@ def best_designs(reader: Reader, count: int) -> dict[float, list[Ranked]]:
     return dict(sorted(best.items()))
 
 
-def _order(ranked: Ranked) -> tuple[bool, float, int]:
+def _order(ranked: Ranked) -> tuple[bool, bool, float, int]:
     figure = ranked.bound if ranked.objective is None else ranked.objective
-    return ranked.objective is None, inf if figure is None else figure, ranked.design
+    found = inf if figure is None else figure
+    return not ranked.follows, ranked.objective is None, found, ranked.design
 
 
 def _ranked(reader: Reader) -> Iterator[Ranked]:
@@ -52,6 +58,7 @@ def _ranked(reader: Reader) -> Iterator[Ranked]:
             records[0].nox_weight,
             mean_objective([[_figure(r, "objective_l_per_100km") for r in of] for of in cycles]),
             mean_bound([_bound_of_best(of) for of in cycles]),
+            follows(record.row for record in records),
         )
 
 

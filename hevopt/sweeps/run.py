@@ -1,18 +1,20 @@
 """A sweep from its study to its store: plan, leave out what the store has, run the rest, store it as it comes."""
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
 from time import monotonic
 
+from hevopt.cycle import load_cycle
 from hevopt.errors import DataError
-from hevopt.provenance import digest
+from hevopt.provenance import digest, files_digests, versions
 from hevopt.sweeps.backends import Run, workers
 from hevopt.sweeps.child import Terms, code_digest
-from hevopt.sweeps.designs import Designs, designs_of, groups_of
+from hevopt.sweeps.designs import Designs, cars_of, designs_of, groups_of
 from hevopt.sweeps.jobs import BOUND, Job, Planned, jobs_of
-from hevopt.sweeps.prune import Bounded, mean_bound, mean_objective, search
+from hevopt.sweeps.prune import Bounded, follows, mean_bound, mean_objective, search
 from hevopt.sweeps.store import Store
 from hevopt.sweeps.study_file import SweepStudy
 
@@ -44,6 +46,12 @@ class Plan:
     designs: Designs
     jobs: list[Job]
     planned: list[Planned]
+
+    @property
+    def prunable(self) -> bool:
+        """Whether two designs share a NOx weight, so that one can condemn the other."""
+        weights = {case.design: case.nox_weight for case in self.planned}
+        return len(set(weights.values())) < len(weights)
 
     def picked(self, keys: Iterable[str]) -> Iterator[Job]:
         """Jobs for some of the cases, each of which is run once though several jobs have it."""
@@ -102,14 +110,19 @@ def plan_of(study: SweepStudy, *, prune: bool = False) -> Plan:
 
 def begin(plan: Plan, store: Store, command: str) -> None:
     """Make a plan the store's."""
-    text = plan.study.source.read_text(encoding="utf-8-sig")
+    study = plan.study
+    text = study.source.read_text(encoding="utf-8-sig")
+    cycles = map(load_cycle, study.cycles)
+    inputs = files_digests(cars_of(study, plan.designs), cycles, [study.source])
     meta = {
         "study": text,
         "study_digest": digest(text),
         "code_digest": code_digest(),
+        "versions": json.dumps(versions()),
+        "inputs": json.dumps(inputs),
         "command": command,
+        "study_file": str(study.source.absolute()),
     }
-    meta["study_file"] = str(plan.study.source.absolute())
     store.begin(meta, ((d.number, d.values) for d in plan.designs), plan.planned)
 
 
@@ -195,7 +208,8 @@ def _pruned(course: _Course) -> None:
         else:
             solved.setdefault(case.design, {}).setdefault(case.cycle, []).append(case.key)
     course.run(key for keys in bounds.values() for key in keys)
-    figures = store.figures("bound_l_per_100km", (key for keys in bounds.values() for key in keys))
+    rows = store.rows(key for keys in bounds.values() for key in keys)
+    figures = {key: row and row.get("bound_l_per_100km") for key, row in rows}
     weights = {case.design: case.nox_weight for case in plan.planned}
     waves = search(
         Bounded(design, weights[design], mean_bound([figures[key] for key in keys]))
@@ -207,12 +221,16 @@ def _pruned(course: _Course) -> None:
             wave = waves.send(objectives)
         except StopIteration:
             return
-        store.prune(wave.pruned)
-        for pruned in wave.pruned:
-            spared = course.missing.intersection(_all(solved[pruned.design]))
-            course.missing.difference_update(spared)
-            progress.total -= len(spared)
-            progress.pruned += len(spared)
+        spared = {
+            pruned: course.missing.intersection(_all(solved[pruned.design]))
+            for pruned in wave.pruned
+        }
+        # A design that an earlier run has solved is spared nothing: it stays a solved one.
+        store.prune(pruned for pruned, keys in spared.items() if keys)
+        gone = set().union(*spared.values())
+        course.missing.difference_update(gone)
+        progress.total -= len(gone)
+        progress.pruned += len(gone)
         course.run(key for design in wave.designs for key in _all(solved[design]))
         objectives = {design: _objective(store, solved[design]) for design in wave.designs}
 
@@ -222,16 +240,24 @@ def _all(cycles: dict[str, list[str]]) -> list[str]:
 
 
 def _objective(store: Store, cycles: dict[str, list[str]]) -> float | None:
-    figures = store.figures("objective_l_per_100km", _all(cycles))
+    rows = dict(store.rows(_all(cycles)))
+    if not follows(rows.values()):
+        return None
+    figures = {key: row and row.get("objective_l_per_100km") for key, row in rows.items()}
     return mean_objective([[figures[key] for key in keys] for keys in cycles.values()])
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Cases run for an estimate: how many, how long they took, and what that makes for all on one worker."""
+    """Cases run for an estimate.
+
+    cases: how many; seconds: they took; startup_s: what went by besides, until the worker was up and had compiled
+    total_s: what all cases take on one worker, less that
+    """
 
     cases: int
     seconds: float
+    startup_s: float
     total_s: float
 
 
@@ -249,11 +275,14 @@ def timed_sample(
     places = dict.fromkeys(round(n * last / _SAMPLES) for n in range(_SAMPLES + 1))
     chosen: Sequence[Job] = [jobs[place] for place in places]
     spent: dict[str, float] = {}
+    began_s = ended_s = monotonic()
     with workers(execution.terms(), count=1, notice=watch.notice) as run:
         for outcomes in run(chosen):
             spent |= {outcome.key: outcome.seconds for outcome in outcomes}
+            ended_s = monotonic()
             if watch.stop():
                 raise Stopped
     warm = chosen[1:] or chosen
     mean_s = sum(spent[case.key] for job in warm for case in job.cases) / len(warm)
-    return Sample(len(spent), sum(spent.values()), mean_s * len(jobs))
+    startup_s = max(0.0, ended_s - began_s - mean_s * len(chosen))
+    return Sample(len(spent), sum(spent.values()), startup_s, mean_s * len(jobs))

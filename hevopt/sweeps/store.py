@@ -1,6 +1,7 @@
 """The store of a sweep: one SQLite file, written by one process alone.
 
-    meta     name, value           the study's text, digests, the command, when it was made and last run
+    meta     name, value           the study's text, digests, versions and inputs (file -> SHA-256) as JSON, the
+                                   command, when it was made and last run
     designs  number, parameters    of the study as last run: key path -> value, as JSON
     plan     design, cycle, strategy, nox_weight, key     which case answers for which design
     cases    key, status, row, error, seconds             every result ever stored, by the digest of its inputs
@@ -111,13 +112,14 @@ class Store:
         with told(self.path):
             return self._connection.execute(query).fetchone()[0]
 
-    def figures(self, name: str, keys: Iterable[str]) -> dict[str, float | None]:
-        """Key -> a number of the row of each of some cases; None where there is no row, or no such number in it."""
+    def rows(self, keys: Iterable[str]) -> Iterator[tuple[str, dict[str, Any] | None]]:
+        """Key and row of each of some cases; None where there is none."""
         self.commit()
         query = "SELECT row FROM cases WHERE key = ? AND row IS NOT NULL"
         with told(self.path):
-            found = {key: self._connection.execute(query, (key,)).fetchone() for key in keys}
-        return {key: json.loads(row[0]).get(name) if row else None for key, row in found.items()}
+            for key in keys:
+                found = self._connection.execute(query, (key,)).fetchone()
+                yield key, json.loads(found[0]) if found else None
 
     def close(self) -> None:
         """Write what was taken, and leave one file."""

@@ -19,7 +19,7 @@ from typing import IO, NamedTuple
 from weakref import finalize
 
 from hevopt.errors import SolverError
-from hevopt.sweeps.child import DONE, READY, REFUSED, Terms, late
+from hevopt.sweeps.child import DIFFERS, DONE, READY, REFUSED, CodeDiffers, Terms, late
 from hevopt.sweeps.jobs import Job, Outcome
 
 ONE_THREAD = dict.fromkeys(
@@ -124,8 +124,9 @@ class _Process:
             return
         said = self._said()
         self.end()
-        if kind == REFUSED:
-            raise SolverError(f"a worker cannot start: {text}")
+        if kind in (REFUSED, DIFFERS):
+            refusal = CodeDiffers if kind == DIFFERS else SolverError
+            raise refusal(f"a worker cannot start: {text}")
         raise _NotStarted(f"its process ended before it was ready{said}")
 
     def alive(self) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 
 from hevopt.architecture import Architecture, load_architecture
 from hevopt.case import Case as SolvedCase
-from hevopt.case import dp_case
+from hevopt.case import dp_case, require_nox
 from hevopt.certificate import SCOPE, Certificate
 from hevopt.cycle import Cycle, load_cycle
 from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
@@ -18,7 +18,7 @@ from hevopt.files import find
 from hevopt.powertrain import build_problem
 from hevopt.prices import one_price_dual
 from hevopt.problem import Problem
-from hevopt.rows import Row
+from hevopt.rows import Row, shortfall_marks
 from hevopt.study import run_case
 from hevopt.sweeps.jobs import BOUND, Case, Job, Outcome, inputs_digest
 from hevopt.units import litres_per_100km
@@ -76,6 +76,8 @@ class _Bench:
             self._built = car, cycle, problem
         car, cycle, problem = self._built
         weight = case.nox_weight
+        if weight > 0:
+            require_nox(car, f"nox_weight {weight:g}")
         if case.strategy == BOUND:
             return _bound_row(car, cycle, problem.with_nox_weight(weight))
         if weight not in self._solved:
@@ -90,7 +92,7 @@ def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, A
     row = Row(
         car.name,
         BOUND,
-        "ok",
+        ", ".join(shortfall_marks(problem)) or "ok",
         bound_l_per_100km=_litres(car, cycle, bound_kg),
         certificate=f"{proof}, {SCOPE}",
     )

@@ -1,5 +1,6 @@
 """`hevopt coastdown`: C0, C1, C2 from runs in both directions, against an integrator that shares no code."""
 
+import re
 import sys
 import tomllib
 from pathlib import Path
@@ -202,6 +203,12 @@ def test_from_a_log_to_a_car_that_drives(hevopt):
         assert said in seen.out, said
     assert Path("c.png").read_bytes().startswith(b"\x89PNG")
     contents = tomllib.loads(Path("car.toml").read_text())
+    assert contents["mass_kg"] == contents["road_load"]["coastdown_mass_kg"] == 1300
+    for said in (
+        "becomes the car's mass without hybrid parts",
+        "C0 is taken as rolling resistance",
+    ):
+        assert said in seen.out and said in Path("car.toml").read_text()
     assert contents["wheel_inertia_kgm2"] == pytest.approx(50 * 0.3132**2)
     found = [
         contents["road_load"][k]
@@ -313,6 +320,11 @@ BAD = {
         lambda r: [changed(r[0], speed_mps=np.where(r[0].time_s == 5, np.nan, r[0].speed_mps)), *r[1:]],
         MASS, ["c.csv, line 12: speed is missing"],
     ),
+    "copies": (
+        lambda r: [*r, changed(r[0], label="7", speed_mps=np.round(r[0].speed_mps * 3.6, 3) / 3.6)],
+        MASS, ["runs 1 (c.csv, lines 2 to", "and 7 (c.csv, lines", "are the same recording", "give every run once"],
+    ),
+    "no picture": (lambda r: r, (*MASS, "--plot", "x.txt"), ["--plot x.txt", "allowed: .png, .svg and .pdf"]),
     "no mass": (lambda r: r, (), ["inertia of wheels and shafts is missing"]),
     "no mass of the car": (lambda r: r, ("--like", "car_compact"), ["--mass-kg is missing"]),
     "no wheels": (lambda r: r, ("--mass-kg", "1300"), ["--rotating-mass-kg", "--like NAME"]),
@@ -335,6 +347,105 @@ def test_what_is_no_coast_down_is_one_clear_message(hevopt, name):
     seen = hevopt("coastdown", "c.csv", *arguments)
     assert seen.status == 2 and seen.out == "" and seen.err.count("hevopt: error: ") == 1, seen
     assert all(words in seen.err for words in said), seen.err
+    assert sorted(Path().iterdir()) == before
+
+
+def in_words(runs: list[Run], words: tuple[str, ...]) -> None:
+    """Write c.csv with a text for each run's direction."""
+    written("c.csv", runs)
+    head, *rows = Path("c.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    rows = [",".join([run, words[int(run) - 1], *rest]) for run, _, *rest in cells]
+    Path("c.csv").write_text("\n".join([head, *rows]) + "\n")
+
+
+def test_two_texts_are_two_directions_and_the_first_met_is_plus(hevopt):
+    runs = coast(np.random.default_rng(3), 6, grade=0.003, noise=0.05)
+    written("c.csv", runs)
+    numbers = hevopt("coastdown", "c.csv", *MASS)
+    for one, other in (("N", "S"), ("east", "West"), ("a", "b")):
+        in_words(runs, (one, other, one, other.lower(), one, other))
+        seen = hevopt("coastdown", "c.csv", *MASS)
+        assert f"direction: {one} counts as +1, {other} as -1" in seen.out
+        assert seen.out.split("6 runs, ")[1] == numbers.out.split("6 runs, ")[1]
+    swapped = [changed(run, direction=-run.direction) for run in runs]
+    written("c.csv", swapped)
+    assert "in direction +1: slope -0.2" in hevopt("coastdown", "c.csv", *MASS).out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("N", "S", "E", "S", "N", "S"), "3 directions found (N, S, E)"),
+        (("N", "1", "N", "1", "N", "1"), "c.csv, line 99: direction is missing, or not one of two"),
+        (("N", "", "N", "S", "N", "S"), "c.csv, line 99: direction is missing, or not one of two"),
+    ],
+)  # fmt: skip
+def test_texts_that_are_not_two_directions_are_refused(hevopt, words, said):
+    runs = coast(np.random.default_rng(3), 6, grade=0.003, noise=0.05)
+    in_words(runs, words)
+    seen = hevopt("coastdown", "c.csv", *MASS)
+    assert seen.status == 2
+    assert said.replace("99", str(len(runs[0].time_s) + 2)) in seen.err, seen.err
+
+
+def test_a_gap_in_time_parts_runs_and_a_log_without_one_says_how(hevopt):
+    runs = coast(np.random.default_rng(3), 4, noise=0.05)
+    written("c.csv", runs)
+    apart = hevopt("coastdown", "c.csv", *MASS)
+    for pause_s, status in ((6.0, 0), (4.0, 2)):
+        shifted, start = [], 0.0
+        for run in runs:
+            shifted.append(changed(run, time_s=run.time_s + start))
+            start = shifted[-1].time_s[-1] + pause_s
+        written("log.csv", shifted, "time [s],v [km/h]", 2)
+        seen = hevopt("coastdown", "log.csv", *MASS, "--directions", "+,-,+,-")
+        assert seen.status == status
+        if status:
+            for words in (
+                "the files hold 1",
+                "a column run",
+                "a file for each",
+                "a gap in time of more than 5 s",
+            ):
+                assert words in seen.err, words
+        else:
+            assert "a gap in time begins a new run in line " in seen.out
+            assert seen.out.split("4 runs, ")[1] == apart.out.split("4 runs, ")[1]
+
+
+def test_no_interval_is_printed_as_zero(hevopt):
+    runs = coast(np.random.default_rng(3), 4, grade=0.001)
+    nearly = [
+        changed(run, time_s=run.time_s[k:], speed_mps=run.speed_mps[k:])
+        for k, run in enumerate(runs)
+    ]
+    written("c.csv", nearly)
+    seen = hevopt("coastdown", "c.csv", *MASS)
+    widths = re.findall(r"± (<?)([0-9.]+) N", seen.out)
+    assert len(widths) == 9 and all(float(width) > 0 for _, width in widths)
+    assert "C0 =   110.000 ± <0.001 N" in seen.out and "± <0.1 N" in seen.out
+    assert "agree better than measured ones can" in seen.out
+
+
+@pytest.mark.parametrize(
+    ("name", "start"), [("c.svg", b"<?xml"), ("c.pdf", b"%PDF"), ("c.PNG", b"\x89PNG")]
+)
+def test_the_picture_is_of_the_kind_its_name_says_and_the_same_each_time(hevopt, name, start):
+    written("c.csv", coast(np.random.default_rng(3), 4, noise=0.05))
+    pictures = []
+    for _ in range(2):
+        seen = hevopt("coastdown", "c.csv", *MASS, "--plot", name)
+        assert seen.status == 0 and "no car file written; --out FILE writes the car" in seen.out
+        pictures.append(Path(name).read_bytes())
+    assert pictures[0].startswith(start) and pictures[0] == pictures[1]
+
+
+def test_without_a_file_to_write_it_says_so(hevopt):
+    written("c.csv", coast(np.random.default_rng(3), 4, noise=0.05))
+    before = sorted(Path().iterdir())
+    seen = hevopt("coastdown", "c.csv", *MASS)
+    assert "no file written; --out FILE writes the car" in seen.out
     assert sorted(Path().iterdir()) == before
 
 

@@ -264,6 +264,25 @@ def test_uneven_grades_keep_the_climb(tmp_path):
         )
 
 
+FASTSIM_NAMES = [
+    ("cycSecs", "cycMps", "cycGrade"), ("time_s", "mps", "grade"),
+    ("time_seconds", "speed_meters_per_second", "grade"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("names", FASTSIM_NAMES)
+def test_grades_of_fastsim_hold_over_the_step_that_ends_at_their_row(tmp_path, names):
+    # Steps of 50, 500, 500 and 50 m: 0.01 over the first 550 m, 0.03 over the last.
+    rows = "0,0,0.01\n10,10,0.01\n60,10,0.01\n110,10,0.03\n120,0,0.03\n"
+    result = imported(tmp_path, ",".join(names) + "\n" + rows)
+    assert result.cycle.grade[[0, 59, 60, 119]] == pytest.approx([0.01, 0.01, 0.03, 0.03])
+    assert ("grade", "22.0 m up, 0.0 m down") in summary(result)
+    assert any("step that ends at it (FASTSim" in text for text in result.rules)
+    # Elsewhere a row's grade holds to the next row: 0.01 over 1050 m, 0.03 over 50 m.
+    other = imported(tmp_path, "t [s],v [m/s],grade [-]\n" + rows)
+    assert ("grade", "12.0 m up, 0.0 m down") in summary(other)
+
+
 def test_altitude_becomes_grade_only_where_it_is_named(tmp_path):
     rows = "".join(f"{t},36,{0.4 * t}\n" for t in range(61))
     text = "time_s,speed_kmh,altitude_m\n" + rows
@@ -344,6 +363,81 @@ def test_a_gap_is_named_and_drawn_straight_across(tmp_path):
     assert part in refusal(tmp_path, text)
     result = imported(tmp_path, text, repair=True)
     assert result.cycle.speed_mps == pytest.approx([0, 1, 2, 3, 4, 5, 5.9])
+
+
+@pytest.mark.parametrize(("step_s", "missing", "limit"), [(5, 8, "25"), (1, 9, "5"), (1, 5, "5")])
+def test_a_gap_of_more_than_five_steps_is_refused(tmp_path, step_s, missing, limit):
+    rows = [f"{step_s * t},15\n" for t in range(40)]
+    text = "time [s],speed [m/s]\n" + "".join(rows[:10] + rows[10 + missing :])
+    part = f"line 12: {step_s * (missing + 1)} s without a sample before"
+    message = refusal(tmp_path, text)
+    assert part in message and f"(limit {limit} s)" in message
+    assert [part in repair for repair in imported(tmp_path, text, repair=True).repairs] == [True]
+
+
+def test_steps_of_more_than_three_usual_ones_are_listed_by_line(tmp_path):
+    rows = [f"{t},15\n" for t in range(60)]
+    text = "time_s,speed_mps\n" + "".join(rows[:10] + rows[13:30] + rows[34:50] + rows[52:])
+    result = imported(tmp_path, text)
+    long = "across 2 steps of more than 3 times the usual 1 s: line 12: 4 s; line 29: 5 s"
+    assert result.rules[-1].endswith(long) and long in result.text
+    assert not any(
+        "steps of more" in t for t in imported(tmp_path, text[: text.index("13,")]).rules
+    )
+
+
+def test_a_clock_that_passes_midnight_is_one_fault_whose_repair_goes_on(tmp_path):
+    clock = [f"{(86395 + t) % 86400}" for t in range(16)]
+    clock = [f"{int(s) // 3600:02}:{int(s) // 60 % 60:02}:{int(s) % 60:02}" for s in clock]
+    text = "time,speed_kmh\n" + "".join(f"{t},{v}\n" for t, v in zip(clock, DRIVE_KMH, strict=True))
+    message = refusal(tmp_path, text)
+    assert "1 fault (1 clocks past midnight)" in message
+    assert "line 7: time 0 s after 86399 s: the clock passes midnight" in message
+    cycle = imported(tmp_path, text, repair=True).cycle
+    assert cycle.duration_s == 15
+    assert cycle.speed_mps * 3.6 == pytest.approx(DRIVE_KMH, abs=1e-5)
+    # A single time of 0 within a day is a fault of its own.
+    message = refusal(tmp_path, text.replace("00:00:02", "23:59:58"))
+    assert "line 9: time 86398 s" in message
+
+
+@pytest.mark.parametrize(("first", "second"), [("00:00", "00:01"), ("01/02/2024 10:00:00", "x")])
+def test_times_in_another_form_are_named_with_the_forms_that_are_read(tmp_path, first, second):
+    message = refusal(tmp_path, f"time,speed [m/s]\n{first},0\n{second},1\n")
+    assert f"line 2: column time: '{first}' is not a time that can be read" in message
+    assert "2024-02-01 10:00:01" in message
+
+
+def test_a_negative_speed_that_is_a_spike_too_is_one_fault(tmp_path):
+    text = "time_s,speed_kmh\n0,0\n1,20\n2,40\n3,60\n4,-60\n5,60\n6,40\n7,20\n8,0\n"
+    message = refusal(tmp_path, text)
+    assert "1 fault (1 negative speeds)" in message and "drawn between its neighbours" in message
+    result = imported(tmp_path, text, repair=True)
+    assert result.cycle.speed_mps[4] * 3.6 == pytest.approx(60, abs=1e-5)
+    assert "of the repaired drive's" in dict(summary(result))["distance"]
+    plain = imported(tmp_path, "time_s,speed_kmh\n" + PLAIN)
+    assert "of the file's" in dict(summary(plain))["distance"]
+
+
+@pytest.mark.parametrize(
+    ("header", "option"),
+    [
+        ("time [s],speed [km/h]\ns,m/s\n", "--speed-unit"),
+        ("time_s,speed_kmh\ns,m/s\n", "--speed-unit"),
+        ("time_min,speed [m/s]\ns,m/s\n", "--time-unit"),
+        ("cycSecs,cycMps\ns,km/h\n", "--speed-unit"),
+    ],
+)
+def test_two_units_for_one_column_are_refused_unless_the_user_says_which(tmp_path, header, option):
+    message = refusal(tmp_path, header + PLAIN)
+    assert "(units row), but" in message and f"say which holds with {option}" in message
+    imported(tmp_path, header + PLAIN, units={"speed": "km/h", "time": "s"})
+
+
+def test_a_suffix_that_only_looks_like_a_unit_contradicts_nothing(tmp_path):
+    text = "time [s],v_s,other_kmh\ns,km/h,m/s\n" + PLAIN.replace("\n", ",0\n")
+    result = imported(tmp_path, text, columns={"speed": "v_s"})
+    assert result.cycle.speed_mps.max() == pytest.approx(10)
 
 
 def test_all_faults_are_listed_or_counted_and_too_many_are_not_repaired(tmp_path):

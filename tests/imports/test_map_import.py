@@ -21,6 +21,14 @@ RPM = pi / 30
 SPEEDS = (850, 1000, 1250, 1500, 1750, 2000, 2250, 2500, 2750, 3000, 3250, 3500, 4000, 4500, 5000)
 TORQUES = (0, 5, 10, 20, 30, 45, 60, 80, 100, 125, 150, 175, 200, 225, 250, 270)
 LIKE = ("--like", "engine_diesel_1600")
+OWN = (
+    "--displacement-cm3",
+    "1598",
+    "--set",
+    "fuel.heating_value_mjpkg=42.9",
+    "--set",
+    "fuel.density_kgpl=0.835",
+)
 ENGINE = load_architecture("A").engine
 HEAT_JPKG = 42.9e6
 
@@ -137,6 +145,7 @@ UNITS = {
     "rpm": ("speed [rpm]", lambda p: p[0]),
     "rad/s": ("speed [rad/s]", lambda p: p[0] * RPM),
     "Nm": ("torque [Nm]", lambda p: p[1]),
+    "kW": ("power [kW]", lambda p: p[1] * p[0] * RPM / 1e3),
     "bar": ("BMEP [bar]", lambda p: 4 * pi * p[1] / 1598e-6 / 1e5),
     "g/s": ("fuel [g/s]", lambda p: p[2] / 3600),
     "kg/h": ("fuel [kg/h]", lambda p: p[2] / 1e3),
@@ -153,7 +162,8 @@ UNITS = {
 @pytest.mark.parametrize(
     ("path", "full"),
     [("rad/s Nm g/s|NOx mg/s", False), ("rpm bar kg/h|NOx g/kWh", True), ("rad/s bar g/kWh|NOx g/h", False),
-     ("rpm Nm fraction|NOx g/h", False), ("rad/s bar %|NOx mg/s", True), ("rpm Nm l/h|NOx g/h", False)],
+     ("rpm Nm fraction|NOx g/h", False), ("rad/s bar %|NOx mg/s", True), ("rpm Nm l/h|NOx g/h", False),
+     ("rpm kW g/s|NOx g/h", True)],
 )  # fmt: skip
 def test_every_unit_path_gives_the_same_component(hevopt, path, full):
     points = bench(TORQUES[1:], full).T
@@ -163,7 +173,16 @@ def test_every_unit_path_gives_the_same_component(hevopt, path, full):
         flows, nox = way.split("|")
         names, values = zip(*(UNITS[u] for u in [*flows.split(), nox]), strict=True)
         write(f"b{k}.csv", ",".join(names), *(value(points) for value in values))
-        arguments = ("--kind", "engine", *LIKE, "--motoring", "motoring.csv", "--set", "name=b")
+        arguments = (
+            "--kind",
+            "engine",
+            *LIKE,
+            "--motoring",
+            "motoring.csv",
+            "--set",
+            "name=b",
+            *OWN,
+        )
         assert hevopt("maps", "import", f"b{k}.csv", *arguments).status == 0
         found.append(component(f"b{k}.toml"))
     assert found[0].keys() == found[1].keys()
@@ -495,6 +514,13 @@ GOOD = (
         ("n [rpm],T [Nm],fuel [g/h]\n800,9,400\n2000,50,900\n3000,91,1500\n", [*LIKE], ["3 points", "4 or more"]),
         (",10,20\n1000,1,2\n2000,3,4\n", [*LIKE, "--unit", "fuel=g/s"], ["does not tell its axes", "--rows speed"]),
         ("", [*LIKE], ["b.csv: empty"]),
+        (GOOD.replace("T [Nm]", "T [bar]"), [*LIKE], ["displacement of the engine measured", "--displacement-cm3"]),
+        (GOOD.replace("g/h", "l/h"), [*LIKE], ["--set fuel.density_kgpl=VALUE"]),
+        (GOOD.replace("fuel [g/h]", "eta [-]"), [*LIKE], ["efficiency up to 9000"]),
+        (GOOD, [*LIKE, "--displacement-cm3", "1400", "--set", "displacement_cm3=1500"], ["are one key; give one"]),
+        (GOOD, [*LIKE, "--set", "scale.displacement=2"], ["written as measured", "where a car uses"]),
+        (GOOD, [*LIKE, "--set", "full_load.torque_nm=3"], ["from the measured points"]),
+        (GOOD.replace("T [Nm]", "power [kW]").replace("800,0", "0,0"), [*LIKE], ["line 2", "torque at rest"]),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_clear_message(hevopt, text, arguments, said):
@@ -510,7 +536,7 @@ def test_bad_input_is_one_clear_message(hevopt, text, arguments, said):
 @pytest.mark.parametrize(
     ("text", "arguments", "said"),
     [
-        (GOOD.replace("fuel [g/h]", "loss [W]"), ["--full-load", "b.csv"], ["of an engine only"]),
+        (GOOD.replace("fuel [g/h]", "loss [W]"), ["--motoring", "b.csv"], ["of an engine only"]),
         (GOOD.replace("fuel [g/h]", "loss [g/h]"), [], ["unit 'g/h' is one of mass flow"]),
         (GOOD.replace("fuel [g/h]", "eff [%]"), [], ["efficiency up to 90"]),
         (GOOD.replace("fuel [g/h]", "Pel [W]"), [], ["loss or speed below 0"]),
@@ -548,3 +574,93 @@ def test_an_engine_of_another_displacement_takes_its_drag_by_mean_pressure(hevop
         replace(ENGINE, displacement_m3=3196e-6), np.array(800 * RPM)
     )
     assert component("b.toml")["fuel_map"]["motoring_torque_nm"][0] == pytest.approx(float(drag))
+
+
+def test_what_lies_below_the_lowest_measured_torque_is_assumed_and_no_coverage(hevopt):
+    rpm, torque, fuel, _ = bench(TORQUES[4:]).T
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, fuel)
+    write_motoring()
+    seen = hevopt(
+        "maps", "import", "b.csv", "--kind", "engine", *LIKE, "--motoring", "motoring.csv"
+    )
+    assert "ASSUMED below the lowest measured torque (30 Nm)" in seen.out, seen
+    assert "g/s, " in seen.out and "NOT MEASURED but assumed, linear from 30 Nm" in seen.out
+    covered = float(seen.out.split("coverage: ")[1].split("%")[0])
+    speed = np.linspace(850, 5000, 2000) * RPM
+    full = engine_model.full_load_torque_nm(ENGINE, speed)
+    # A slack of 1 % of the largest torque belongs to the measured part.
+    assert covered == pytest.approx(100 * (1 - 30 / full.mean()), abs=1.5)
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    seen = hevopt(
+        "maps", "import", "b.csv", "--kind", "engine", *LIKE, "--motoring", "motoring.csv"
+    )
+    assert "NOT MEASURED" not in seen.out and "ends below" not in seen.out
+
+
+def test_a_hole_between_points_is_a_wide_gap(hevopt):
+    rpm, torque, fuel, _ = bench().T
+    arguments = ("maps", "import", "b.csv", "--kind", "engine", *LIKE)
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, fuel)
+    assert "WARNING" not in hevopt(*arguments).out
+    kept = ~((rpm > 1400) & (rpm < 3100) & (torque > 50) & (torque < 190))
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm[kept], torque[kept], fuel[kept])
+    seen = hevopt(*arguments)
+    assert "WARNING: a hole in the measurement" in seen.out
+    place = seen.out.split("points: around ")[1].split(" Nm")[0]
+    at = [float(word) for word in place.replace(" rpm", "").split(",")]
+    assert 1400 < at[0] < 3100 and 50 < at[1] < 190
+
+
+def test_speeds_that_wander_are_lines_and_keep_their_points(hevopt):
+    rpm, torque, fuel, _ = bench(TORQUES[2:], wander_rpm=20.0).T
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, fuel)
+    seen = hevopt("maps", "import", "b.csv", "--kind", "engine", *LIKE)
+    assert "15 speed lines; points moved" in seen.out, seen
+    off = float(seen.out.split("fuel differs by ")[1].split("%")[0])
+    assert off < 2 and "neighbours disagree" not in seen.out
+
+
+def test_impossible_fuel_and_points_above_full_load_are_warned_of(hevopt):
+    rpm, torque, fuel, _ = bench().T
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, 10 * fuel)
+    write("full.csv", "n [rpm],T [Nm]", [850, 5000], [80, 80])
+    seen = hevopt("maps", "import", "b.csv", "--kind", "engine", *LIKE, "--full-load", "full.csv")
+    assert "WARNING: less than any engine has" in seen.out
+    assert "points were measured above full load, by up to" in seen.out
+
+
+def test_a_machines_full_load_curve_sets_its_limits_and_ends_its_map(hevopt):
+    speed, torque = np.meshgrid(
+        np.arange(0, 6001, 500.0), np.arange(-100, 101, 10.0), indexing="ij"
+    )
+    write("m.csv", "speed [rpm],torque [Nm],loss [W]", speed.ravel(), torque.ravel(),
+          50 + torque.ravel() ** 2 / 10)  # fmt: skip
+    rpm = np.array([100, 1000, 2000, 4000, 5000])
+    limit = np.array([80, 80, 60, 30, 20])
+    write("full.csv", "speed [rpm],power [kW]", rpm, limit * rpm * RPM / 1e3)
+    seen = hevopt("maps", "import", "m.csv", "--kind", "machine", "--full-load", "full.csv")
+    assert seen.status == 0, seen
+    found = component("m.toml")
+    assert found["torque_max_nm"] == pytest.approx(80) and found["speed_max_rpm"] == 5000
+    assert found["power_max_w"] == pytest.approx(max(limit * rpm * RPM), rel=1e-5)
+    machine = load_architecture(car_with("machine", "m.toml")).machine
+    for sign in (1, -1):
+        held = machine_model.loss_w(machine, sign * limit * 0.999, rpm * RPM)
+        assert np.isfinite(held).all()
+        assert np.isnan(machine_model.loss_w(machine, np.array(sign * 61.0), np.array(4000 * RPM)))
+
+
+def test_a_shortfall_is_driven_with_what_a_masked_map_covers(hevopt):
+    fuel, _ = lattice()
+    Path("g.csv").write_text(
+        grid_text("n [rpm] \\ T [Nm]", np.where(np.array(TORQUES[1:]) > 130, np.nan, fuel))
+    )
+    speeds = np.array(SPEEDS) * RPM
+    write("full.csv", "n [rpm],T [Nm]", SPEEDS, engine_model.full_load_torque_nm(ENGINE, speeds))
+    seen = hevopt("maps", "import", "g.csv", "--kind", "engine", *LIKE, "--unit", "fuel=g/h",
+                  "--full-load", "full.csv")  # fmt: skip
+    assert "the map ends below the curve at 100% of the speeds" in seen.out, seen
+    assert "reaches up to the curve" not in seen.out
+    for name in ("A", "C2"):
+        table = compare("us06", [car_with("engine", "g.toml", name)], ["dp"], allow_shortfall=True)
+        assert table.rows[0].fuel_l_per_100km is not None, table.rows[0]

@@ -133,6 +133,7 @@ def test_matlab_matrices_structures_and_types(tmp_path):
         ("Speed [km/h]", "km/h", "speed"), ("v (m/s)", "m/s", "v"), ("v / (km/h)", "km/h", "v"),
         ("n / min^-1", "min^-1", "n"), ("v in km/h", "km/h", "v"), ("Speed, mph", "mph", "speed"),
         ("Engine speed rpm", "rpm", "enginespeed"), ("torque_nm", "Nm", "torque"),
+        ("speed_meters_per_second", "m/s", "speed"), ("GPS Speed (Meters/second)", "Meters/second", "gpsspeed"),
         ("fuel_g_kwh", "g/kWh", "fuel"), ("speed_m_s", "m/s", "speed"), ("mps", "mps", "mps"),
         ("fuel_gps", "g/s", "fuel"), ("speed_gps", None, "speedgps"), ("Speed (GPS)", None, "speedgps"),
         ("t", None, "t"), ("min", None, "min"), ("Load [-]", "-", "load"), ("log.time_s", "s", "time"),
@@ -147,6 +148,7 @@ def test_names_carry_units_in_every_usual_way(name, unit, base):
 @pytest.mark.parametrize(
     ("text", "quantity", "si"),
     [
+        ("Meters/second", "speed", 1.0), ("km/hr", "speed", 1 / 3.6), ("miles/hour", "speed", 0.44704),
         ("km/h", "speed", 1 / 3.6), ("KPH", "speed", 1 / 3.6), ("mph", "speed", 1609.344 / 3600),
         ("kn", "speed", 1852 / 3600), ("ft/s", "speed", 0.3048), ("ms", "time", 1e-3),
         ("1/min", "rotation", np.pi / 30), ("min⁻¹", "rotation", np.pi / 30), ("N·m", "torque", 1.0),

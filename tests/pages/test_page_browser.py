@@ -319,6 +319,26 @@ def test_names_from_files_stay_text(nedc, opened, tmp_path):
     assert page.locator("[data-effects]:visible").count() == 1
 
 
+def test_what_was_not_asked_for_is_said_and_a_wide_figure_says_to_scroll(nedc, opened):
+    page = opened(nedc.path, viewport={"width": 400, "height": 800}).page
+    said = page.locator("#left-out").inner_text()
+    assert "--fronts" in said and "--sensitivity" in said
+    assert page.locator("#h-calibration").inner_text() == "Calibration of the rules"
+    assert page.locator("#figure-sankey.wider").count() == 1
+    assert page.locator("#figure-fuel-bars.wider").count() == 0
+
+
+def test_bounds_of_fronts_have_the_colour_of_their_car(nedc, opened, tmp_path):
+    fronts = {"pareto": [front("C2"), front("D")]}
+    contents = json.loads(nedc.results.model_dump_json()) | fronts
+    path = tmp_path / "fronts.html"
+    path.write_text(comparison_page(type(nedc.results).model_validate(contents)), encoding="utf-8")
+    page = opened(path).page
+    found = page.evaluate("document.getElementById('pareto-front').data.map(t => t.line.color)")
+    assert found[0] == found[1] != found[2] == found[3]
+    assert "--fronts" not in page.locator("#left-out").inner_text()
+
+
 def test_forty_rows_of_1800_steps_stay_small_and_quick(opened, tmp_path):
     results = forty_rows()
     assert len(results.rows) == 40 and len(next(iter(results.cars.values())).time_s) >= 1800

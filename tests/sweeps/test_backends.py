@@ -117,6 +117,12 @@ def test_workers_that_cannot_start_are_an_error_and_not_failed_cases(terms, word
         outcomes_of(sweep_workers.jobs(4), terms, count=1)
 
 
+def test_other_code_than_the_sweep_began_with_is_an_interruption():
+    with pytest.raises(SolverError, match="results so far are stored") as found:
+        outcomes_of(sweep_workers.jobs(2), Terms("sweep_workers:work", code="other"), count=1)
+    assert found.value.exit_status == 4
+
+
 @pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=pytest.mark.long)])
 def test_killed_workers_lose_nothing_and_double_nothing(backend):
     """Both what holds a worker up and what it holds: the jobs under way are run again."""

@@ -5,12 +5,12 @@ from math import inf, nan, nextafter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hevopt.sweeps.prune import Bounded, Pruned, Wave, mean_bound, mean_objective, search
+from hevopt.sweeps.prune import Bounded, Pruned, Wave, follows, mean_bound, mean_objective, search
 
 
 def run(designs, objectives, wave):
     """All waves of a search whose designs have these objectives."""
-    steps, waves = search(designs, wave), []
+    steps, waves = search(designs, (wave,)), []
     try:
         waves.append(next(steps))
         while True:
@@ -65,6 +65,20 @@ def test_failed_designs_condemn_nothing_and_failed_bounds_are_solved():
     assert not any(wave.pruned for wave in waves)
     after_a_good_one = run([Bounded(0, 0.0, inf), Bounded(1, 0.0, 1.0)], {0: 5.0, 1: 1.0}, 1)
     assert [wave.designs for wave in after_a_good_one] == [(0,), (1,)]
+
+
+def test_waves_begin_small_and_grow_for_each_weight():
+    designs = [Bounded(n, n % 2, 1.0) for n in range(240)]
+    steps = search(designs)
+    sizes = [len(next(steps).designs)]
+    while sum(sizes) < 240:
+        sizes.append(len(steps.send(dict.fromkeys(range(240), 2.0)).designs))
+    assert sizes == [8, 16, 32, 64, 64, 56]
+
+
+def test_a_design_follows_its_cycles_where_no_row_has_a_shortfall():
+    good, short = {"status": "not neutral"}, {"status": "not neutral, shortfall at 9 steps"}
+    assert follows([good, None, {}]) and not follows([good, short])
 
 
 def test_means_are_over_cycles_of_the_best_strategy():

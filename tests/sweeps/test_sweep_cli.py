@@ -91,7 +91,8 @@ def test_a_dry_run_tells_what_would_run_and_stores_nothing(tmp_path, monkeypatch
         "6 designs, 6 more excluded by constraints; 12 cases, 0 of them in the store"
     )
     assert out.count("  design ") == 5 and "machine.power_max_w = 30000" in out
-    assert "timed sample: 12 cases" in out and "on one worker" in out and "on 2" in out
+    assert "timed sample: 12 cases" in out and "on one worker" in out and "on 2, " in out
+    assert "to start and compile" in out
     assert not (tmp_path / "study.sqlite").exists()
 
 
@@ -109,8 +110,26 @@ def test_infeasible_designs_are_results_and_failed_ones_are_not(tmp_path, monkey
         "time_s,speed_mps\n0,0\n1,18\n2,36\n3,54\n4,36\n5,18\n6,0\n"
     )
     status, out, err = called(monkeypatch, capsys, study, "--jobs", "1")
-    assert status == 0 and "8 cases of 8 designs: 8 infeasible; 8 results of other inputs" in out
-    assert "none of this study as it is now" in err
+    assert status == 0 and "8 cases of 8 designs: 8 infeasible; 8 more results are kept" in out
+    assert "none that this study asks for as it is now" in err
+
+
+def test_what_pruning_did_or_cannot_do_is_told(tmp_path, monkeypatch, capsys):
+    study = write_study(tmp_path, 3, 2)
+    sweep_here(study, tmp_path / "s.sqlite", "landscape", workers=1, prune=True)
+    _, out, _ = called(monkeypatch, capsys, "--status", tmp_path / "s.sqlite")
+    assert "pruned: its bound, " in out and "above the objective of design" in out
+    head = study.read_text().split("battery")[0]
+    weights = "nox_weight = { from = 0, to = 1, count = 23 }\n"
+    study.write_text(head + weights)
+    sweep_here(study, tmp_path / "w.sqlite", "work", workers=1)
+    _, out, _ = called(monkeypatch, capsys, "--status", tmp_path / "w.sqlite")
+    lines = [line for line in out.splitlines() if line.strip()[:1].isdigit()]
+    assert "and 3 more NOx weights" in out and len(lines) == 21  # the first counts the cases
+    range_of = "battery.cells_in_series = { from = 32, to = 33, count = 10 }\n"
+    study.write_text(head + range_of)
+    _, out, _ = called(monkeypatch, capsys, study, "--dry-run", "--jobs", "1")
+    assert "battery.cells_in_series: 10 values asked for, 2 once rounded" in out
 
 
 @pytest.mark.parametrize(

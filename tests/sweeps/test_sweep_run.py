@@ -1,17 +1,21 @@
 """From study to store: each case once, whatever is there; the same rows whoever ran them; pruning; memory."""
 
+import hashlib
+import json
 import os
 import subprocess
 import sys
 from contextlib import contextmanager, nullcontext
+from pathlib import Path
 from pkgutil import resolve_name
 from random import Random
 
 import pytest
 from sweep_runs import check_sound, stored, sweep_here, table, write_study
 
+import hevopt
 from hevopt.errors import DataError
-from hevopt.sweeps.prune import WAVE
+from hevopt.sweeps.prune import WAVES
 from hevopt.sweeps.ranking import best_designs
 from hevopt.sweeps.reading import open_to_read
 from hevopt.sweeps.run import Execution, Stopped, Watch, plan_of, timed_sample
@@ -102,7 +106,71 @@ def test_pruning_finds_the_same_best_designs_and_condemns_only_worse_ones(tmp_pa
         assert objectives[found.incumbent] == found.objective
     assert counts["pruned"] == len(pruned) and counts["missing"] == 0
     # What is left to solve begins with a wave for each weight.
-    assert counts["ok"] - 340 >= 2 * WAVE
+    assert counts["ok"] - 340 >= 2 * WAVES[0]
+
+
+def test_designs_that_do_not_follow_condemn_none_and_rank_after_all_that_do(tmp_path, here):
+    study, store = write_study(tmp_path, 5, 4), tmp_path / "s.sqlite"
+    sweep_here(study, store, "short_of_torque", workers=1, prune=True)
+    with open_to_read(store) as reader:
+        best, pruned = best_designs(reader, 40), reader.pruned()
+    assert len(best) == 2 and pruned
+    for designs in best.values():
+        good = [design.follows for design in designs]
+        assert good == sorted(good, reverse=True) and not all(good)
+        assert designs[0].objective > 4 and designs[-1].objective == 0.1
+    short = {d.design for designs in best.values() for d in designs if not d.follows}
+    assert not short & {found.incumbent for found in pruned}
+
+
+def test_what_an_earlier_run_has_solved_is_not_pruned(tmp_path, here):
+    study, store = write_study(tmp_path, 5, 4), tmp_path / "s.sqlite"
+    sweep_here(study, store, "landscape", workers=1)
+    assert sweep_here(study, store, "landscape", workers=1, prune=True).pruned == 0
+    with open_to_read(store) as reader:
+        assert reader.pruned() == [] and reader.counts()["ok"] == 80
+
+
+def test_the_table_has_what_is_known_of_a_pruned_design(tmp_path, here):
+    study, store = write_study(tmp_path, 17, 10), tmp_path / "s.sqlite"
+    sweep_here(study, store, "landscape", workers=1, prune=True)
+    head, *lines = table(store)
+    lines = [dict(zip(head, line, strict=True)) for line in lines]
+    solved = {x["design"]: x for x in lines if (x["outcome"], x["strategy"]) == ("ok", "ecms")}
+    pruned = [line for line in lines if line["outcome"] == "pruned"]
+    assert pruned and head[-4:-1] == [
+        "design_bound_l_per_100km", "incumbent", "incumbent_objective_l_per_100km",
+    ]  # fmt: skip
+    for line in pruned:
+        incumbent = line["incumbent_objective_l_per_100km"]
+        assert solved[line["incumbent"]]["objective_l_per_100km"] == incumbent
+        assert line["bound_l_per_100km"] == line["design_bound_l_per_100km"]
+        assert float(line["design_bound_l_per_100km"]) > float(incumbent)
+        assert line["objective_l_per_100km"] == "" and line["incumbent"] != line["design"]
+    assert not any(line["incumbent"] for line in solved.values())
+
+
+def test_a_store_knows_the_versions_and_the_digests_of_all_files_it_came_from(tmp_path, here):
+    study, store = write_study(tmp_path, 2, 2), tmp_path / "s.sqlite"
+    engines = 'engine = ["engine_diesel_1600", "engine_diesel_1600_steep_nox"]\n'
+    study.write_text(study.read_text() + engines)
+    sweep_here(study, store, "landscape", workers=1)
+    with open_to_read(store) as reader:
+        meta = reader.meta()
+    inputs = json.loads(meta["inputs"])
+    assert json.loads(meta["versions"])["hevopt"] == hevopt.__version__
+    stems = {Path(file).stem for file in inputs}
+    assert {"C2", "short", "study", "engine_diesel_1600", "engine_diesel_1600_steep_nox"} <= stems
+    for file, found in inputs.items():
+        assert hashlib.sha256(Path(file).read_bytes()).hexdigest() == found
+
+
+def test_a_study_whose_designs_share_no_nox_weight_has_nothing_to_prune(tmp_path):
+    study = write_study(tmp_path, 2, 2)
+    assert plan_of(read_study(study)).prunable
+    head = study.read_text().split("battery")[0]
+    study.write_text(f"{head}nox_weight = {{ from = 0, to = 9, count = 4 }}\n")
+    assert not plan_of(read_study(study)).prunable
 
 
 def test_pruned_designs_are_solved_after_all_without_pruning(tmp_path, here):
@@ -124,6 +192,8 @@ def test_the_sample_for_an_estimate_is_run_and_not_stored(tmp_path):
     sample = timed_sample(plan, missing, Execution(work="sweep_workers:work"), Watch())
     # Five jobs of two cases a millisecond each, out of twenty.
     assert sample.cases == 10 and sample.total_s == pytest.approx(20 * 0.002)
+    # A worker's process imports numpy and numba before its first case.
+    assert sample.startup_s > 0.1
     assert timed_sample(plan, set(), Execution(), Watch()) is None
 
 

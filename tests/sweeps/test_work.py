@@ -53,7 +53,8 @@ def test_a_key_says_everything_that_can_change_a_result_and_nothing_else():
     assert keys == {p.key for p in one_job()[1]}
     assert not keys & {p.key for p in one_job(allow_shortfall=True)[1]}
     other = next(jobs_of("C2", ["udds"], ["dp"], [(CHANGES, [(0, 0.0)])]))[1]
-    written = dict(CHANGES, hybrid_mass_kg=70.0)  # the file's own value, given once more
+    # The file's own value, given once more, and a text that changes no result.
+    written = dict(CHANGES, hybrid_mass_kg=70, description="another")
     same = next(jobs_of("C2", ["nedc"], ["dp"], [(written, [(7, 0)])]))[1]
     assert other[0].key not in keys and same[0].key in keys
 
@@ -88,3 +89,8 @@ def test_a_file_that_changes_while_a_sweep_runs_fails_its_cases(tmp_path):
     cycle.write_text("time_s,speed_kmh\n0,0\n10,40\n20,36\n30,0\n")
     (outcome,) = run_job(job)
     assert outcome.status == "failed" and "changed after the sweep began" in outcome.error
+
+
+def test_a_bound_says_where_the_cycle_is_not_followed():
+    ((job, _),) = jobs_of("A", ["us06"], ["bound"], [({}, [(0, 0.0)])], allow_shortfall=True)
+    assert "shortfall at" in run_job(job)[0].row["status"]

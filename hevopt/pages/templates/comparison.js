@@ -18,7 +18,7 @@
     for (const place of document.querySelectorAll(".chosen-name")) place.textContent = nameOf(row);
     for (const block of document.querySelectorAll("[data-row]")) block.hidden = block.dataset.row !== `${f.architecture}|${f.strategy}`;
     for (const line of byId("comparison").tBodies[0].rows) line.classList.toggle("chosen", line.dataset.index === String(index));
-    byId("row-facts").textContent = `${fixed(f.fuel_l_per_100km, 3)} l/100 km · NOx ${fixed(f.nox_mg_per_km, 0)} mg/km · ${f.gap_percent === null ? "no bound" : `${fixed(f.gap_percent, 3)} % above the bound`} · ${f.status}`;
+    byId("row-facts").textContent = `${fixed(f.fuel_l_per_100km, 3)} l/100 km · NOx ${f.nox_mg_per_km === null ? "unknown" : `${fixed(f.nox_mg_per_km, 0)} mg/km`} · ${f.gap_percent === null ? "no bound" : `${fixed(f.gap_percent, 3)} % above the bound`} · ${f.status}`;
     showWindow();
     DETAIL.forEach(draw);
     Page.say(`showing ${nameOf(row)}`);

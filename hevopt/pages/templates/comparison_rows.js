@@ -139,7 +139,7 @@ const AllRows = (() => {
       const n = carNames().indexOf(row.figures.architecture), line = lineOf(look, n), members = row.detail.calibration;
       data.push({ type: "scatter", mode: "lines+markers", name: plain(nameOf(row)), x: members.map(x), y: members.map(y), line,
         marker: { symbol: members.map((m) => SYMBOLS[n % SYMBOLS.length] + (m.neutral ? "" : "-open")), size: 6, color: line.color },
-        customdata: members.map((m) => [m.nox_mg_per_km, m.surplus_j / 1e3]), hovertemplate: `${plain(nameOf(row))}<br>%{x:.2f} kW: %{y:.3f} l/100 km<br>NO<sub>x</sub> %{customdata[0]:.0f} mg/km, end surplus %{customdata[1]:+.1f} kJ<extra></extra>` });
+        customdata: members.map((m) => [m.nox_mg_per_km === null ? "unknown" : `${fixed(m.nox_mg_per_km, 0)} mg/km`, m.surplus_j / 1e3]), hovertemplate: `${plain(nameOf(row))}<br>%{x:.2f} kW: %{y:.3f} l/100 km<br>NO<sub>x</sub> %{customdata[0]}, end surplus %{customdata[1]:+.1f} kJ<extra></extra>` });
       data.push(ring(look, members.filter((m) => m.chosen), x, y));
     }
     return { data, layout: layout(look, width, { xaxis: axis(look, "electric below (kW at the wheels)", { rangemode: "tozero" }), yaxis: axis(look, `${Shown.results.nox_weight ? "objective" : "fuel"}, corrected (l/100 km)`) }) };
@@ -175,7 +175,7 @@ const AllRows = (() => {
         line, marker: { symbol: SYMBOLS[n % SYMBOLS.length], size: 8 }, customdata: front.points.map((p) => p.nox_weight),
         hovertemplate: `${name}, weight %{customdata:.3g}<br>%{x:.3f} l/100 km, %{y:.1f} mg/km<extra></extra>` });
       data.push({ type: "scatter", mode: "lines", name: `${name}, bound`, legendgroup: name, x: outer.map((c) => c.fuel_l_per_100km), y: outer.map((c) => c.nox_mg_per_km),
-        line: { color: look.ink, width: 1 }, hoverinfo: "skip" });
+        line: { ...line, width: 0.9 }, hoverinfo: "skip" });
     });
     return { data, layout: layout(look, width, { xaxis: axis(look, "fuel (l/100 km)"), yaxis: axis(look, "NO<sub>x</sub> (mg/km)"), hovermode: "closest" }) };
   }

@@ -69,6 +69,7 @@ const Page = (() => {
     const most = onPaper ? (inMaps ? 310 : 880) : Infinity, height = Math.min(most, made.height || Number(element.dataset.height));
     const config = { displaylogo: false, displayModeBar: "hover", staticPlot: onPaper, showTips: false, showSendToCloud: false, plotlyServerURL: "",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+    element.closest("figure").classList.toggle("wider", width > room);
     element.querySelector(".missing")?.remove();
     Plotly.react(element, made.data, { ...made.layout, width, height }, config);
     // On paper and back the library begins anew, without what listened to it.

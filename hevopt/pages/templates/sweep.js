@@ -15,7 +15,7 @@
   const significant = (value) => String(Number(value.toPrecision(4)));
   // The middle is left out: names that belong together often differ at their ends.
   const short = (text, most) => plain(text.length > most ? `${text.slice(0, Math.ceil(most / 2))}…${text.slice(1 - Math.floor(most / 2))}` : text);
-  const titled = (key, unit) => plain(`${key} (${unit || "–"})`);
+  const titled = (key, unit, log) => plain(`${key}${log ? ", log" : ""} (${unit || "–"})`);
   const dark = (look) => parseInt(look.paper.slice(1, 3), 16) < 128;
 
   // share 0: the best. On either paper the best stand out and the worst stay visible.
@@ -25,6 +25,11 @@
   }
 
   const scaleOf = (look) => Array.from({ length: 11 }, (_, n) => [n / 10, colour(look, n / 10)]);
+
+  function nothing(look, width) {
+    const text = "no design of this NO<sub>x</sub> weight to show";
+    return { height: 120, data: [], layout: layout(look, width, { xaxis: { visible: false }, yaxis: { visible: false }, annotations: [{ xref: "paper", yref: "paper", x: 0.5, y: 0.5, showarrow: false, text }] }) };
+  }
 
   // Designs as lines ------------------------------------------------------------------------------------------------
 
@@ -64,6 +69,10 @@
   }
 
   function parallel(look, width) {
+    if (!data.groups[chosen].lines.design.length) {
+      byId("kept").textContent = "No design is drawn.";
+      return nothing(look, width);
+    }
     const bare = axes(), { lines } = data.groups[chosen], count = lines.design.length, last = bare.length - 1, least = 150 + 118 * bare.length;
     // Names have the room between two axes, less that of a neighbour's figures. On paper nothing scrolls.
     const room = Math.max(6, Math.min(24, Math.floor((((width < 640 ? least : width) - 166) / Math.max(last, 1) - 48) / 6)));
@@ -87,7 +96,7 @@
     traces.push({ type: "scatter", mode: "markers", x: [null], y: [null], showlegend: false, hoverinfo: "skip", marker: { color: [merit.low], cmin: merit.low, cmax: merit.high > merit.low ? merit.high : merit.low + 1e-6, colorscale: scaleOf(look), showscale: true,
       colorbar: { title: { text: `${data.merit} (l/100 km)`, side: "right", font: { size: 11 } }, thickness: 12, len: 1, x: 1, xpad: narrow(width) ? 22 : 40, outlinewidth: 0, tickfont: { size: 11 }, tickformat: ".3f" } } });
     byId("kept").textContent = kept.size ? `${within} of ${count} drawn designs are within the ranges.` : `${count}${lines.all > count ? ` of ${lines.all}` : ""} designs are drawn.`;
-    const name = (a) => `${a.key.split(".").map(plain).join(".<br>")}<br>(${plain(a.unit || "–")})`;
+    const name = (a) => `${a.key.split(".").map(plain).join(".<br>")}<br>(${plain(a.unit || "–")})${a.log ? ", log" : ""}`;
     return {
       least, data: [faint, ...traces],
       layout: layout(look, width, {
@@ -137,19 +146,25 @@
   // Fuel against NOx ------------------------------------------------------------------------------------------------
 
   function plane(look, width) {
-    const { groups, front, edge } = data.plane, several = groups.length > 1, traces = [];
-    const points = groups.flatMap((g) => g.fuel.map((fuel, n) => [fuel, g.nox[n]]));
+    const { groups, front, edge, short, pruned } = data.plane, several = groups.length > 1, traces = [];
+    const points = [...groups, short, pruned].flatMap((g) => g.fuel.map((fuel, n) => [fuel, g.nox[n]])).filter(([fuel, nox]) => fuel !== null && nox !== null);
     const ends = (values, room) => { const low = Math.min(...values), high = Math.max(...values), span = high - low || 0.02 * high || 1; return [low - room * span, high + 0.05 * span]; };
     const ys = ends(points.map((p) => p[1]), 0.08);
     const steps = front.fuel.flatMap((fuel, n) => (n === 0 ? [[fuel, ys[1] * 2]] : [[fuel, front.nox[n - 1]]]).concat([[fuel, front.nox[n]]]));
     if (steps.length) steps.push([2 * Math.max(...points.map((p) => p[0])), front.nox[front.nox.length - 1]]);
     traces.push({ type: "scatter", mode: "lines", name: "front of what was found", x: steps.map((p) => p[0]), y: steps.map((p) => p[1]), line: { color: look.muted, width: 1.4, dash: "dot" }, hoverinfo: "skip" });
+    // With more weights than symbols, a symbol comes again in another colour.
+    const hue = (n) => look.colours[HUES[(n + Math.floor(n / SYMBOLS.length)) % HUES.length]];
     groups.forEach((g, n) => traces.push({
       type: "scatter", mode: "markers", name: several ? `NO<sub>x</sub> weight ${plain(g.label)}` : "design", x: g.fuel, y: g.nox, customdata: g.design.map((d, k) => [d, g.weight[k], g.merit[k]]),
-      marker: { symbol: SYMBOLS[n % SYMBOLS.length], size: points.length > 1000 ? 5 : 8, color: look.colours[HUES[n % HUES.length]], opacity: points.length > 300 ? 0.6 : 0.85, line: { color: look.paper, width: 0.5 } },
+      marker: { symbol: SYMBOLS[n % SYMBOLS.length], size: points.length > 1000 ? 5 : 8, color: hue(n), opacity: points.length > 300 ? 0.6 : 0.85, line: { color: look.paper, width: 0.5 } },
       hovertemplate: "design %{customdata[0]}, weight %{customdata[1]:.4g}<br>%{x:.4f} l/100 km, %{y:.1f} mg/km<br>objective %{customdata[2]:.4f} l/100 km<extra></extra>",
     }));
     traces.push({ type: "scatter", mode: "markers", name: "on the front", x: front.fuel, y: front.nox, hoverinfo: "skip", marker: { symbol: "circle-open", size: points.length > 1000 ? 9 : 14, color: look.ink, line: { width: 1.6 } } });
+    const others = (name, g, symbol, colour, worth) => ({ type: "scatter", mode: "markers", name, x: g.fuel, y: g.nox, customdata: g.design.map((d, k) => [d, g.weight[k], g.merit[k]]), marker: { symbol, size: 8, color: colour, line: { width: 1.4, color: colour } },
+      hovertemplate: `${name}: design %{customdata[0]}, weight %{customdata[1]:.4g}<br>${worth} %{customdata[2]:.4f} l/100 km<extra></extra>` });
+    if (short.design.length) traces.push(others("does not follow the cycle", short, "x-thin-open", look.ink, "objective"));
+    if (pruned.design.length) traces.push(others("pruned, by its bound", pruned, "circle-open", look.muted, "bound"));
     let left = Infinity;
     if (edge) {
       traces.push({ type: "scatter", mode: "lines", name: "certified boundary", x: edge.fuel, y: edge.nox, line: { color: look.ink, width: 2.4 }, hovertemplate: "no plan below %{x:.4f} l/100 km at %{y:.1f} mg/km<extra></extra>" });
@@ -174,19 +189,21 @@
   }
 
   function effects(look, width) {
+    if (!data.groups[chosen].effects.length) return nothing(look, width);
     const { effects: found } = data.groups[chosen], columns = narrow(width) ? 1 : Math.min(found.length, width < 1000 ? 2 : 3), rows = Math.ceil(found.length / columns);
-    const every = found.flatMap((e) => [...e.mean, ...e.best]), low = Math.min(...every), high = Math.max(...every), room = 0.07 * (high - low || 0.01 * high);
+    const every = found.flatMap((e) => [...(e.mean ?? []), ...e.best, ...e.floor]).filter((value) => value !== null), low = Math.min(...every), high = Math.max(...every), room = 0.07 * (high - low || 0.01 * high);
     const own = {}, traces = [];
     found.forEach((e, n) => {
       const key = n === 0 ? "" : String(n + 1), places = { xaxis: `x${key}`, yaxis: `y${key}` };
       const x = e.numeric ? e.values : e.values.map((_, k) => k);
       const ticks = e.numeric ? { type: e.log ? "log" : "linear", ...marks(e) } : { tickvals: x, ticktext: e.values.map((text) => short(text, 17)), range: [-0.5, x.length - 0.5] };
-      own[`xaxis${key}`] = axis(look, titled(e.key, e.unit), { anchor: `y${key}`, zeroline: false, fixedrange: true, ...ticks });
+      own[`xaxis${key}`] = axis(look, titled(e.key, e.unit, e.log), { anchor: `y${key}`, zeroline: false, fixedrange: true, ...ticks });
       own[`yaxis${key}`] = axis(look, `${data.merit} (l/100 km)`, { anchor: `x${key}`, zeroline: false, fixedrange: true, range: [low - room, high + room], nticks: 6 });
       const text = e.values.map((value, k) => plain(e.binned ? `${significant(e.low[k])} to ${significant(e.high[k])}` : e.numeric ? significant(value) : value));
-      [["mean", e.mean, 5, "circle", "solid"], ["best", e.best, 1, "diamond", "dash"]].forEach(([name, y, hue, symbol, dash]) => traces.push({
-        type: "scatter", mode: e.numeric ? "lines+markers" : "markers", name, legendgroup: name, showlegend: n === 0, x, y, ...places, text, customdata: e.count, line: { color: look.colours[hue], width: 1.8, dash }, marker: { symbol, size: 8, color: look.colours[hue] },
-        hovertemplate: `%{text}: ${name} %{y:.4f} l/100 km<br>of %{customdata} designs<extra></extra>`,
+      const shown = [["mean", e.mean, 5, "circle", "solid"], ["best", e.best, 1, "diamond", "dash"], ["least bound of pruned", e.floor.some((value) => value !== null) && e.floor, 0, "circle-open", "none"]];
+      shown.filter(([, y]) => y).forEach(([name, y, hue, symbol, dash]) => traces.push({
+        type: "scatter", mode: e.numeric && dash !== "none" ? "lines+markers" : "markers", name, legendgroup: name, showlegend: n === 0, x, y, ...places, text, customdata: e.count, line: { color: look.colours[hue], width: 1.8, dash: dash === "none" ? "solid" : dash }, marker: { symbol, size: 8, color: look.colours[hue] },
+        hovertemplate: `%{text}: ${name} %{y:.4f} l/100 km<br>%{customdata} solved<extra></extra>`,
       }));
     });
     return { height: 70 + 270 * rows, data: traces, layout: layout(look, width, { ...own, grid: { rows, columns, pattern: "independent", xgap: 0.2, ygap: 0.34 }, margin: { l: 62, r: 14, t: 12, b: 50 } }) };
