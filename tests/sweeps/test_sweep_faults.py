@@ -32,7 +32,6 @@ from hevopt.sweeps.reading import open_to_read
 
 ROUNDS = [pytest.param(1, id="once"), pytest.param(20, id="20 times", marks=pytest.mark.long)]
 BACKENDS = [
-    pytest.param("loky", 1, id="loky"),
     pytest.param("loky", 20, id="loky 20 times", marks=pytest.mark.long),
     pytest.param("dask", 20, id="dask 20 times", marks=pytest.mark.long),
     pytest.param("ray", 20, id="ray 20 times", marks=pytest.mark.long),
