@@ -124,9 +124,14 @@ def _status(problem: Problem, surplus_j: float, fuel_j: float) -> str:
 
 def shortfall_marks(problem: Problem) -> list[str]:
     """What a status says of steps driven with less than the cycle asks; empty where there are none."""
-    missing = problem.table.missing_torque_nm
-    count = 0 if missing is None else int((missing > 0).sum())
+    count = shortfall_steps(problem)
     return [f"shortfall at {count} step{'s' if count > 1 else ''}"] if count else []
+
+
+def shortfall_steps(problem: Problem) -> int:
+    """Number of steps driven with less than the cycle asks."""
+    missing = problem.table.missing_torque_nm
+    return 0 if missing is None else int((missing > 0).sum())
 
 
 def engine_starts(problem: Problem, trajectory: Trajectory) -> int:

@@ -3,6 +3,7 @@
 from functools import cache
 
 import pytest
+from command_line import call
 
 ARCHITECTURES = ("A", "B", "C1", "C2", "D", "E")
 HYBRIDS = ("C1", "C2", "D", "E")
@@ -36,3 +37,10 @@ def problem_of():
 def comparison_of():
     """cycle -> comparison of everything on it, cached over the whole run."""
     return _comparison
+
+
+@pytest.fixture
+def hevopt(monkeypatch, capsys, tmp_path):
+    """Run the command line in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *words: call(monkeypatch, capsys, *words)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from command_line import call
 from conftest import ARCHITECTURES
-from test_cli import call
 
 from hevopt import DataError, load_architecture
 from hevopt.architecture_new import new_files

@@ -6,13 +6,11 @@ Every case runs `hevopt.cli.main()` in a fresh folder and looks at what a user w
 import json
 import os
 import stat
-import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from command_line import Seen
 
-from hevopt import cli
 from hevopt.files import shipped_folder
 
 SHIPPED = shipped_folder("architectures")
@@ -29,31 +27,6 @@ FAST = "time_s,speed_kmh\n" + "".join(f"{t},{min(5 * t, 300)}\n" for t in range(
 COLUMNS = ("time_s", "speed_mps", "speed_kmh", "speed_mph", "gear", "clutch_open", "grade")
 LINEAR = "{ intercept = 3.30, slope = 0.57 }"
 RATIOS = "[4.066, 2.219, 1.402, 1.026, 0.813, 0.676]"
-
-
-class Seen(NamedTuple):
-    """What a user sees of a run."""
-
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def hevopt(monkeypatch, capsys, tmp_path):
-    """Run the command line in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Seen:
-        monkeypatch.setattr(sys, "argv", ["hevopt", *arguments])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as stop:
-            status = stop.code or 0
-        return Seen(status, *capsys.readouterr())
-
-    return run
 
 
 def check(seen: Seen, status: int, *said: str) -> None:

@@ -8,22 +8,13 @@ import subprocess
 import sys
 
 import pytest
+from command_line import call
 
-from hevopt.cli import main
 from hevopt.rows import Row
 
 KEYS = """architecture, strategy, status, fuel_l_per_100km, delta_fuel_percent, co2_g_per_km, nox_mg_per_km,
 delta_nox_percent, soc_start, soc_end, delta_energy_percent, fuel_corrected_l_per_100km, engine_starts,
 bound_l_per_100km, gap_percent, certificate, solve_s"""
-
-
-def call(monkeypatch, capsys, *words):
-    """Exit status, standard output and standard error of a command."""
-    monkeypatch.setattr("sys.argv", ["hevopt", *words])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    captured = capsys.readouterr()
-    return stop.value.code or 0, captured.out, captured.err
 
 
 def test_json_has_the_promised_keys_in_order(monkeypatch, capsys):

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import call
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_cli import call
 
 from hevopt import DataError, build_problem, load_architecture, load_cycle, outputs, simulate, solve
 from hevopt.rows import Row

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from command_line import call
 from problems import every_plan, random_problem
-from test_cli import call
 
 from hevopt import Battery, ControlTable, DataError, InfeasibleError, Problem, simulate, solve
 from hevopt.pareto import GAP_ENOUGH, figures_of, front

@@ -5,7 +5,7 @@ from functools import cache
 from math import log
 
 import pytest
-from test_cli import call
+from command_line import call
 
 from hevopt import InfeasibleError, load_architecture, load_cycle
 from hevopt.case import prepare

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import pytest
-from test_cli import call
+from command_line import call
 
 from hevopt import DataError, load_architecture, load_cycle, study
 from hevopt.case import prepare

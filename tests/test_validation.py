@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 
 import pytest
+from command_line import call
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_cli import call
 
 from hevopt import DataError, load_cycle
 from hevopt.cycle import cycle_of, faults_in

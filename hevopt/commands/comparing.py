@@ -97,8 +97,7 @@ class Files:
         from hevopt.pages.collect import Collector, check_steps
 
         check_steps(job.trace)
-        sources = [str(car.source) for car in job.cars.cars]
-        check_files(self.page, self.save, sources, str(job.trace.source))
+        check_files(self.page, self.save, job.about["inputs"])
         self._collector = Collector()
 
     def _check_tables(self, job: Job) -> None:

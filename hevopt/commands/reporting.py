@@ -2,12 +2,13 @@
 
 import shlex
 import sys
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hevopt.commands.terminal import check_out, write
+from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
@@ -50,14 +51,17 @@ def _page(file: Path) -> str:
     return comparison_page(load_results(file))
 
 
-def check_files(
-    page: Path | None, saved: Path | None, architectures: list[str], cycle: str
-) -> None:
-    """DataError, before anything is solved, where a file cannot be written or is one of the inputs."""
+def check_files(page: Path | None, saved: Path | None, inputs: Collection[str]) -> None:
+    """DataError, before anything is solved, where a file cannot be written or is one of the files read."""
+    from hevopt.writing import check_writable
+
     for option, out in (("--report", page), ("--save", saved)):
-        for architecture in architectures:
-            if out is not None:
-                check_out(out, architecture, cycle, option)
+        target = None if out is None else check_writable(out)
+        for name in inputs:
+            if target is not None and target.exists() and target.samefile(name):
+                raise DataError(
+                    f"{option} {out} is the file that {name} is read from; choose another"
+                )
     if page is not None and saved is not None and page.resolve() == saved.resolve():
         raise DataError(f"--report and --save name one file, {page}; choose two")
 

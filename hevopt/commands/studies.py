@@ -172,6 +172,7 @@ def _front(
     from hevopt.case import require_nox
     from hevopt.pareto import GAP_ENOUGH, POINTS_MAX, figures_of, front
     from hevopt.powertrain import build_problem
+    from hevopt.rows import shortfall_steps
     from hevopt.strategies import strategy_named
 
     chosen = strategy_named(strategy)
@@ -187,9 +188,7 @@ def _front(
         solve=chosen.solve,
         progress=lambda text, done, total: progress(f"{car.name}: {text}", done, total),
     )
-    missing = problem.table.missing_torque_nm
-    short = 0 if missing is None else int((missing > 0).sum())
-    return figures_of(found, car, trace, strategy), short
+    return figures_of(found, car, trace, strategy), shortfall_steps(problem)
 
 
 def _effects(

@@ -21,7 +21,7 @@ def listed(text: str | None) -> list[str] | None:
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
-def check_out(out: Path, architecture: str, cycle: str, option: str = "--out") -> None:
+def check_out(out: Path, architecture: str, cycle: str) -> None:
     """DataError, before anything is solved, where `out` cannot be written or is one of the inputs."""
     from hevopt.files import find
     from hevopt.writing import check_writable
@@ -29,7 +29,7 @@ def check_out(out: Path, architecture: str, cycle: str, option: str = "--out") -
     target = check_writable(out)
     for kind, name, suffix in (("architectures", architecture, ".toml"), ("cycles", cycle, ".csv")):
         if target.exists() and target.samefile(find(kind, name, suffix)):
-            raise DataError(f"{option} {out} is the file that {name} is read from; choose another")
+            raise DataError(f"--out {out} is the file that {name} is read from; choose another")
 
 
 def show(table: "Table") -> None:

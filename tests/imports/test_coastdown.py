@@ -1,10 +1,8 @@
 """`hevopt coastdown`: C0, C1, C2 from runs in both directions, against an integrator that shares no code."""
 
 import re
-import sys
 import tomllib
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.stats import binom
 
-from hevopt import DataError, cli, load_architecture
+from hevopt import DataError, load_architecture
 from hevopt.files import shipped_folder
 from hevopt.imports.coastdown import Run, fit_road_load, speed_after
 from hevopt.vehicle import Vehicle
@@ -22,31 +20,6 @@ TRUTH = np.array([110.0, 0.9, 0.41])
 MASS_KG, ROTATING_KG = 1300.0, 50.0
 MASS = ("--mass-kg", "1300", "--rotating-mass-kg", "50")
 GRAVITY = 9.80665
-
-
-class Seen(NamedTuple):
-    """What a user sees of a run."""
-
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def hevopt(monkeypatch, capsys, tmp_path):
-    """Run the command line in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Seen:
-        monkeypatch.setattr(sys, "argv", ["hevopt", *arguments])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as stop:
-            status = stop.code or 0
-        return Seen(status, *capsys.readouterr())
-
-    return run
 
 
 def coast(

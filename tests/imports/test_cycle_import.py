@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import command_line
 import numpy as np
 import openpyxl
 import pytest
@@ -10,7 +11,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hevopt import build_problem, load_architecture, load_cycle
-from hevopt.cli import main
 from hevopt.demand import demand_of
 from hevopt.errors import DataError
 from hevopt.imports.cycle_import import import_cycle, summary
@@ -506,11 +506,7 @@ def test_gears_and_grades_that_are_none_are_faults(tmp_path):
 
 
 def call(monkeypatch, capsys, *words):
-    monkeypatch.setattr("sys.argv", ["hevopt", "cycles", "import", *words])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    captured = capsys.readouterr()
-    return stop.value.code or 0, captured.out, captured.err
+    return command_line.call(monkeypatch, capsys, "cycles", "import", *words)
 
 
 def test_the_command_prints_assumptions_and_summary_and_writes_only_with_out(

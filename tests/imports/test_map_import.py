@@ -5,13 +5,12 @@ import tomllib
 from dataclasses import replace
 from math import pi
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hevopt import cli, compare, load_architecture
+from hevopt import compare, load_architecture
 from hevopt import engine as engine_model
 from hevopt import machine as machine_model
 from hevopt.files import shipped_folder
@@ -31,31 +30,6 @@ OWN = (
 )
 ENGINE = load_architecture("A").engine
 HEAT_JPKG = 42.9e6
-
-
-class Seen(NamedTuple):
-    """What a user sees of a run."""
-
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def hevopt(monkeypatch, capsys, tmp_path):
-    """Run the command line in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Seen:
-        monkeypatch.setattr(sys, "argv", ["hevopt", *arguments])
-        try:
-            cli.main()
-            status = 0
-        except SystemExit as stop:
-            status = stop.code or 0
-        return Seen(status, *capsys.readouterr())
-
-    return run
 
 
 def bench(torques=TORQUES, full: bool = True, wander_rpm: float = 0.0) -> np.ndarray:

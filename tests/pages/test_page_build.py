@@ -6,21 +6,14 @@ from html import unescape
 from time import perf_counter
 
 import pytest
+from command_line import call
 
 from hevopt import writing
-from hevopt.cli import main
+from hevopt.files import shipped_folder
 from hevopt.pages import page
 from hevopt.pages.comparison import comparison_page
 
 SMALL = ("compare", "--architectures", "A,B")
-
-
-def call(monkeypatch, capsys, *words):
-    monkeypatch.setattr("sys.argv", ["hevopt", *words])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    captured = capsys.readouterr()
-    return stop.value.code or 0, captured.out, captured.err
 
 
 def test_the_default_page_is_small_and_built_at_once(nedc):
@@ -95,6 +88,18 @@ def test_a_place_that_cannot_be_written_is_refused_before_solving(
     words = (*SMALL, "--cycle", str(cycle), option, str(cycle))
     status, _, err = call(monkeypatch, capsys, *words)
     assert status == 2 and f"{option} {cycle} is the file" in err
+
+
+@pytest.mark.parametrize("option", ["--report", "--save"])
+def test_a_component_or_a_study_file_is_not_overwritten(monkeypatch, capsys, tmp_path, option):
+    monkeypatch.setattr("hevopt.study.compare", lambda *a, **k: pytest.fail("solved first"))
+    car, study = tmp_path / "car.toml", tmp_path / "study.toml"
+    car.write_bytes((shipped_folder("architectures") / "components/car_compact.toml").read_bytes())
+    study.write_text('architectures = ["A"]\nset = { car = "./car.toml" }\n')
+    for path in (car, study):
+        before = path.read_bytes()
+        status, _, err = call(monkeypatch, capsys, "compare", study, option, path)
+        assert status == 2 and "choose another" in err and path.read_bytes() == before
 
 
 def test_one_file_for_page_and_results_or_for_both_ends_of_report_is_refused(

@@ -10,9 +10,9 @@ import time
 
 import pyarrow.parquet as pq
 import pytest
+from command_line import call
 from sweep_runs import gone, run, start, stored, sweep_here, table, wait_for_results, write_study
 
-from hevopt.cli import main
 from hevopt.commands import sweep_view
 from hevopt.sweeps.lock import locked
 from hevopt.sweeps.run import Progress
@@ -28,11 +28,7 @@ def swept(tmp_path_factory):
 
 
 def called(monkeypatch, capsys, *words):
-    """Exit status, stdout and stderr of a command run in this process."""
-    monkeypatch.setattr(sys, "argv", ["hevopt", "sweep", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return ended.value.code, *capsys.readouterr()
+    return call(monkeypatch, capsys, "sweep", *words)
 
 
 def test_a_sweep_says_what_came_of_it_and_where_it_is(swept):

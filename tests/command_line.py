@@ -1,0 +1,23 @@
+"""The command line, run in the process of the tests as a user would run it."""
+
+from typing import NamedTuple
+
+import pytest
+
+from hevopt.cli import main
+
+
+class Seen(NamedTuple):
+    """What a user sees of a run."""
+
+    status: int
+    out: str
+    err: str
+
+
+def call(monkeypatch, capsys, *words) -> Seen:
+    """Exit status, standard output and standard error of `hevopt` with these words."""
+    monkeypatch.setattr("sys.argv", ["hevopt", *map(str, words)])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return Seen(stop.value.code or 0, *capsys.readouterr())
