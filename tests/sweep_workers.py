@@ -1,10 +1,12 @@
 """Stand-ins for the work of a sweep: quick, and able to do to a worker whatever a case might."""
 
+import contextlib
 import os
 import signal
 import time
 from zlib import crc32
 
+from hevopt.errors import SolverError
 from hevopt.sweeps.jobs import Case, Job, Outcome
 
 
@@ -127,6 +129,14 @@ def act(what):
         case "hang":
             while True:
                 time.sleep(0.01)
+        case "hang and shrug":
+            with contextlib.suppress(SolverError):
+                act("hang")
+        case "hang and garble":
+            try:
+                act("hang")
+            except SolverError:
+                raise KeyError("what a library made of it") from None
         case "hang in C":
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
             while True:

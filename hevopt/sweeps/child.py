@@ -12,7 +12,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from pkgutil import resolve_name
@@ -121,35 +121,50 @@ class _Bench:
 
     def __init__(self, pipe: Connection, terms: Terms, work: Work) -> None:
         self._pipe, self._terms, self._work = pipe, terms, work
-        self._loading_s, self._place = terms.loading_s, 0
-        signal.signal(signal.SIGALRM, self._late)
+        self._loading_s = terms.loading_s
+        # The case under a time limit, the next one, and those that were late.
+        self._timed: int | None = None
+        self._next, self._late = 0, set[int]()
+        signal.signal(signal.SIGALRM, self._stop)
 
     def outcomes(self, job: Job) -> list[Outcome]:
         """Exactly one outcome for every case, each fit to be stored."""
-        self._place, began = 0, perf_counter()
+        self._next, began = 0, perf_counter()
+        self._late.clear()
         try:
             found = {outcome.key: outcome for outcome in self._work(job, self._guard)}
             fault = "the worker gave no outcome for this case"
         except BaseException as error:
             found, fault = {}, f"{type(error).__name__}: {error}"
-        took_s = perf_counter() - began
-        missing = Outcome("", "failed", None, fault, took_s)
-        return [_storable(case.key, found.get(case.key, missing)) for case in job.cases]
+        missing = Outcome("", "failed", None, fault, perf_counter() - began)
+        outcomes = [_storable(case.key, found.get(case.key, missing)) for case in job.cases]
+        # Whatever the case made of the exception that was to stop it.
+        for place in self._late:
+            outcomes[place] = replace(
+                outcomes[place], status="failed", row=None, error=late(self._terms.timeout_s)
+            )
+        return outcomes
 
     @contextmanager
     def _guard(self) -> Iterator[None]:
-        self._pipe.send((CASE, self._place))
-        if self._terms.timeout_s is not None:
-            signal.setitimer(signal.ITIMER_REAL, self._terms.timeout_s + self._loading_s)
+        place, self._next = self._next, self._next + 1
+        limit_s, self._loading_s = self._loading_s, 0.0
+        self._pipe.send((CASE, place))
         try:
+            if self._terms.timeout_s is not None:
+                self._timed = place
+                signal.setitimer(signal.ITIMER_REAL, self._terms.timeout_s + limit_s)
             yield
         finally:
+            self._timed = None
             signal.setitimer(signal.ITIMER_REAL, 0)
-            self._place += 1
-            self._loading_s = 0.0
 
-    def _late(self, *_: Any) -> None:
-        raise SolverError(late(self._terms.timeout_s))
+    def _stop(self, *_: Any) -> None:
+        place, self._timed = self._timed, None
+        # An alarm that is heard only after its case stops nothing.
+        if place is not None:
+            self._late.add(place)
+            raise SolverError(late(self._terms.timeout_s))
 
 
 def late(timeout_s: float | None) -> str:

@@ -79,22 +79,28 @@ def test_a_worker_computes_with_one_thread():
 def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_path):
     marker = str(tmp_path / "died")
     does = {
-        1: "raise", 4: "hang", 8: "hang in C", 13: "die", 17: "unstorable", 20: "nan", 25: "exit",
-        30: ["die once", marker], 34: "eat",
+        1: "raise", 4: "hang", 8: "hang in C", 10: "hang and shrug", 13: "die", 17: "unstorable", 20: "nan",
+        25: "exit", 30: ["die once", marker], 35: "hang and garble",
     }  # fmt: skip
-    terms = Terms("sweep_workers:work", timeout_s=0.5, memory_mb=700, loading_s=0.0)
+    terms = Terms("sweep_workers:work", timeout_s=0.5, loading_s=0.0)
     found = by_key(outcomes_of(sweep_workers.jobs(20, 2, does), terms, count=2))
     assert set(found) == {f"k{n}" for n in range(40)}
     errors = {int(key[1:]): o.error for key, o in found.items() if o.status == "failed"}
     # An exit is the end of a job's process: the other case of the job is not to blame, but has no outcome either.
     assert set(errors) == set(does) - {30} | {24}
     expected = {
-        1: "not today", 4: "more than 0.5 s", 8: "more than 0.5 s", 13: "signal 9.*twice", 17: "cannot be stored",
-        20: "cannot be stored", 25: "SystemExit", 34: "MemoryError",
-    }  # fmt: skip
+        1: "not today", 13: "signal 9.*twice", 17: "cannot be stored", 20: "cannot be stored", 25: "SystemExit",
+    } | dict.fromkeys((4, 8, 10, 35), "^timeout: took more than 0.5 s$")  # fmt: skip
     for number, words in expected.items():
         assert re.search(words, errors[number]), errors[number]
     assert os.path.exists(marker)
+
+
+def test_a_case_that_eats_memory_is_its_own_failure():
+    terms = Terms("sweep_workers:work", memory_mb=700)
+    found = by_key(outcomes_of(sweep_workers.jobs(2, 2, {1: "eat"}), terms, count=1))
+    assert [found[f"k{n}"].status for n in range(4)] == ["ok", "failed", "ok", "ok"]
+    assert "MemoryError" in found["k1"].error
 
 
 @pytest.mark.parametrize(("work", "words"), [("raises", "all of it"), ("forgets", "no outcome")])
