@@ -3,6 +3,7 @@
 import os
 import stat
 import tempfile
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from hevopt.errors import DataError
@@ -29,6 +30,26 @@ def check_writable(path: Path) -> Path:
     except RuntimeError:
         fault = "Links in a circle"
     raise DataError(f"{path}: cannot be written ({fault}); choose another place")
+
+
+def check_outs(outs: Mapping[str, Path | None], inputs: Iterable[str | Path] = ()) -> None:
+    """DataError, before anything is computed, where a file cannot be written, is one that is read, or named twice.
+
+    outs: option -> its file, None where it is not asked for; inputs: the files that are read
+    """
+    read = {os.path.realpath(source): source for source in inputs}
+    taken: dict[str, str] = {}
+    for option, path in outs.items():
+        if path is None:
+            continue
+        target = str(check_writable(path))
+        if target in read:
+            raise DataError(
+                f"{option} {path} is the file that {read[target]} is read from; choose another"
+            )
+        if target in taken:
+            raise DataError(f"{taken[target]} and {option} name one file, {path}; choose two")
+        taken[target] = option
 
 
 def write_whole(path: Path, contents: bytes) -> None:

@@ -375,7 +375,7 @@ def test_place_that_cannot_be_written(hevopt, command, out):
         ("read_only", "Read-only file"),
         ("loop", "cannot be written"),
         ("c.csv", "--out c.csv is the file that c.csv is read from"),
-        ("link", "--out link is the file that ./x.toml is read from"),
+        ("link", "--out link is the file that x.toml is read from"),
     ],
 )
 def test_out_is_refused_before_anything_is_solved(hevopt, monkeypatch, out, said):
@@ -390,6 +390,15 @@ def test_out_is_refused_before_anything_is_solved(hevopt, monkeypatch, out, said
     for command in ("run", "table"):
         check(hevopt(command, "./x.toml", "--cycle", "c.csv", "--out", out), 2, said)
     assert stat.S_ISFIFO(Path("pipe").stat().st_mode)
+
+
+@pytest.mark.parametrize("command", ["run", "table"])
+def test_out_never_overwrites_a_component(hevopt, command):
+    Path("car.toml").write_bytes((SHIPPED / "components/car_compact.toml").read_bytes())
+    before = Path("car.toml").read_bytes()
+    seen = hevopt(command, "A", "--set", "car=./car.toml", "--out", "car.toml")
+    check(seen, 2, "--out car.toml is the file that car.toml is read from", "choose another")
+    assert Path("car.toml").read_bytes() == before
 
 
 def test_out_follows_links_and_keeps_the_mode(hevopt):

@@ -155,8 +155,8 @@ def test_drives_with_different_columns_are_joined_with_gaps():
         (("--out", "x.xlsx"), "suffix '.xlsx' is unknown; allowed: .csv, .parquet, .json"),
         (("--out", "x"), "a suffix is needed; allowed: .csv, .parquet, .json"),
         (("--out", "no/x.csv"), "No such folder"),
-        (("--out", "x.csv", "--out-steps", "./x.csv"), "is the file of --out as well"),
-        (("--out", "short.csv"), "--out short.csv is an input"),
+        (("--out", "x.csv", "--out-steps", "./x.csv"), "--out and --out-steps name one file"),
+        (("--out", "short.csv"), "--out short.csv is the file that short.csv is read from"),
     ],
 )
 def test_a_wrong_output_is_one_message_before_anything_is_solved(hevopt, words, said):

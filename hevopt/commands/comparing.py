@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hevopt.commands.reporting import check_files, command_line, write_files
+from hevopt.commands.reporting import command_line, write_files
 from hevopt.commands.terminal import show, write
 from hevopt.errors import DataError
 
@@ -82,7 +82,14 @@ class Files:
         """DataError, before anything is solved, where a file cannot be written, is an input, or is named twice, and
         for fronts of NOx where an engine has no data on it.
         """
-        self._check_tables(job)
+        from hevopt.outputs import check_table_file
+        from hevopt.writing import check_outs
+
+        tables = {"--out": self.out, "--out-steps": self.steps}
+        check_outs({"--report": self.page, "--save": self.save, **tables}, job.about["inputs"])
+        for path in tables.values():
+            if path is not None:
+                check_table_file(path)
         if self.fronts:
             from hevopt.case import require_nox
 
@@ -97,24 +104,7 @@ class Files:
         from hevopt.pages.collect import Collector, check_steps
 
         check_steps(job.trace)
-        check_files(self.page, self.save, job.about["inputs"])
         self._collector = Collector()
-
-    def _check_tables(self, job: Job) -> None:
-        from hevopt.outputs import check_table_file
-        from hevopt.writing import check_writable
-
-        taken = {Path(name).resolve(): "an input" for name in job.about["inputs"]}
-        for option, path in (("--report", self.page), ("--save", self.save)):
-            if path is not None:
-                taken[path.resolve()] = f"the file of {option} as well"
-        for option, path in (("--out", self.out), ("--out-steps", self.steps)):
-            if path is not None:
-                target = check_writable(path)
-                if target in taken:
-                    raise DataError(f"{option} {path} is {taken[target]}; choose another")
-                check_table_file(path)
-                taken[target] = f"the file of {option} as well"
 
     def observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
         """Take what the files need of a solved case."""

@@ -102,10 +102,8 @@ def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
 
 
 def _check_out(out: Path, file: Path) -> None:
-    from hevopt.writing import check_writable
+    from hevopt.writing import check_outs
 
     if out.suffix.lower() != ".csv":
         raise DataError(f"--out {out}: a cycle file's name ends in .csv; give such a name")
-    target = check_writable(out)
-    if target.exists() and file.exists() and target.samefile(file):
-        raise DataError(f"--out {out} is the file that is read; choose another name")
+    check_outs({"--out": out}, [file])

@@ -77,7 +77,7 @@ def import_map(
     from hevopt.imports.map_engine import import_engine
     from hevopt.imports.map_machine import import_machine
     from hevopt.imports.map_report import coverage
-    from hevopt.writing import write_whole
+    from hevopt.writing import check_outs, write_whole
 
     values = _values(given)
     if displacement_cm3 is not None:
@@ -89,7 +89,7 @@ def import_map(
     sources = [file, *(source.path for source in request.extra.values())]
     out = _beside(file, ".toml") if out is None else out
     plot = _beside(out, ".png")
-    _check_outs([out, plot], sources)
+    check_outs({"--out": out, "the plot": plot}, sources)
     imported = import_engine(request) if kind == "engine" else import_machine(request)
     said = coverage(imported)
     head = [
@@ -146,9 +146,9 @@ def coastdown(
     from hevopt.imports.coastdown_report import results
     from hevopt.imports.coastdown_runs import ROLES, ROLES_WITH_UNIT, read_runs
     from hevopt.imports.component_text import component_text
-    from hevopt.writing import write_whole
+    from hevopt.writing import check_outs, write_whole
 
-    _check_outs([path for path in (out, plot) if path is not None], files)
+    check_outs({"--out": out, "--plot": plot}, files)
     kind = None if plot is None else _picture_kind(plot)
     values = _values(given) | {
         key: value
@@ -265,20 +265,6 @@ def _beside(path: Path, suffix: str) -> Path:
     if not path.stem or path.stem == "..":
         raise DataError(f"{path}: not the name of a file")
     return path.with_suffix(suffix)
-
-
-def _check_outs(outs: list[Path], sources: list[Path]) -> None:
-    """DataError, before anything is computed, where a file to write cannot be, or is one that is read."""
-    from hevopt.writing import check_writable
-
-    for out in outs:
-        target = check_writable(out)
-        if any(
-            source.exists() and target.exists() and target.samefile(source) for source in sources
-        ):
-            raise DataError(f"{out} is a file that is read; choose another place to write to")
-    if len({out.resolve() for out in outs}) < len(outs):
-        raise DataError(f"{outs[0]}: the file and its plot would be one; choose another name")
 
 
 def _digests(sources: list[Path]) -> list[str]:

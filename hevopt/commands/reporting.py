@@ -2,14 +2,12 @@
 
 import shlex
 import sys
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hevopt.commands.terminal import write
-from hevopt.errors import DataError
 
 if TYPE_CHECKING:
     from hevopt.pages.results import Results
@@ -24,11 +22,9 @@ def report(
     out: Annotated[Path, typer.Option("--out", help="The HTML page to write.")],
 ) -> None:
     """Write the page of saved results: one HTML file that opens offline."""
-    from hevopt.writing import check_writable, write_whole
+    from hevopt.writing import check_outs, write_whole
 
-    target = check_writable(out)
-    if file.exists() and target.exists() and target.samefile(file):
-        raise DataError(f"--out {out} is the file that the results are read from; choose another")
+    check_outs({"--out": out}, [file])
     write_whole(out, _page(file).encode())
     write(f"written to {out}")
 
@@ -49,21 +45,6 @@ def _page(file: Path) -> str:
     from hevopt.pages.saved import load_results
 
     return comparison_page(load_results(file))
-
-
-def check_files(page: Path | None, saved: Path | None, inputs: Collection[str]) -> None:
-    """DataError, before anything is solved, where a file cannot be written or is one of the files read."""
-    from hevopt.writing import check_writable
-
-    for option, out in (("--report", page), ("--save", saved)):
-        target = None if out is None else check_writable(out)
-        for name in inputs:
-            if target is not None and target.exists() and target.samefile(name):
-                raise DataError(
-                    f"{option} {out} is the file that {name} is read from; choose another"
-                )
-    if page is not None and saved is not None and page.resolve() == saved.resolve():
-        raise DataError(f"--report and --save name one file, {page}; choose two")
 
 
 def write_files(results: "Results", page: Path | None, saved: Path | None) -> list[str]:

@@ -14,7 +14,7 @@ from hevopt.commands.options import (
     RefineOption,
     takes_settings,
 )
-from hevopt.commands.terminal import Progress, check_out, listed, show, write
+from hevopt.commands.terminal import Progress, listed, show, write
 
 _OPTIONS = "the command line"
 
@@ -126,6 +126,7 @@ def run(
     from hevopt.cycle import load_cycle
     from hevopt.strategies import strategy_named
     from hevopt.study_file import cars_of, settings_of
+    from hevopt.writing import check_outs
 
     strategy_named(strategy)
     study.check_horizon(horizon, [strategy])
@@ -135,7 +136,7 @@ def run(
     job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
     if out is not None:
-        check_out(out, architecture, cycle)
+        check_outs({"--out": out}, job.about["inputs"])
         outputs.check_table_file(out)
     nox_weight = settings.get("nox_weight", 0.0)
     with Progress() as progress:
@@ -182,13 +183,16 @@ def table(
     """Write the control table of an architecture on a cycle, for other solvers."""
     from hevopt import report
     from hevopt.case import require_nox
+    from hevopt.commands.comparing import Job
     from hevopt.cycle import load_cycle
     from hevopt.powertrain import build_problem
     from hevopt.study_file import cars_of, settings_of
+    from hevopt.writing import check_outs
 
     settings = settings_of(_OPTIONS, given)
-    car, trace = cars_of(settings, [architecture]).cars[0], load_cycle(cycle)
-    check_out(out, architecture, cycle)
+    job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
+    car, trace = job.cars.cars[0], job.trace
+    check_outs({"--out": out}, job.about["inputs"])
     nox_weight = settings.get("nox_weight", 0.0)
     if nox_weight > 0:
         require_nox(car, f"nox_weight {nox_weight:g}")

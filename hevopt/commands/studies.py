@@ -1,6 +1,6 @@
 """`hevopt pareto`, `sensitivity` and `reproduction`: many problems solved for one answer."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +12,7 @@ from hevopt.commands.options import (
     JsonOption,
     takes_settings,
 )
-from hevopt.commands.terminal import Progress, check_out, listed, show, write
+from hevopt.commands.terminal import Progress, listed, show, write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def pareto(
     settings = settings_of(_OPTIONS, given)
     cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
     if out is not None:
-        _check_csv(out, str(cars.cars[0].source), str(trace.source))
+        _check_csv(out, [*cars.cars[0].files, *filter(None, [trace.source])])
     with Progress() as progress:
         figures, shortfall_steps = _front(
             cars.cars[0],
@@ -224,12 +224,13 @@ def _numbers(option: str, text: str) -> list[float]:
         ) from None
 
 
-def _check_csv(out: Path, architecture: str, cycle: str) -> None:
+def _check_csv(out: Path, inputs: Iterable[Path]) -> None:
     from hevopt.files import printable
+    from hevopt.writing import check_outs
 
     if out.suffix.lower() != ".csv":
         raise DataError(f"--out {printable(str(out))}: choose a name that ends in .csv")
-    check_out(out, architecture, cycle)
+    check_outs({"--out": out}, inputs)
 
 
 def _about(cars: "Cars", trace: "Cycle") -> dict[str, Any]:

@@ -122,14 +122,10 @@ def _check(
     """DataError, before anything is planned, where something could not be had at the end."""
     from hevopt.sweeps.export import check_export
     from hevopt.sweeps.pools import check_backend
-    from hevopt.writing import check_writable
+    from hevopt.writing import check_outs
 
     check_backend(execution.backend, execution.scheduler)
-    check_writable(store)
-    paths = {"the study": study, "--store": store, "--export": export}
-    named = {what: path.resolve() for what, path in paths.items() if path is not None}
-    if len(set(named.values())) < len(named):
-        raise DataError(f"{', '.join(named)} name one file; choose different ones")
+    check_outs({"--store": store, "--export": export}, [study])
     if export is not None:
         check_export(export)
     if store.exists() and store.stat().st_size and not resume:
@@ -297,9 +293,9 @@ def _show_status(path: Path) -> None:
 def _export(store: Path, out: Path) -> None:
     from hevopt.sweeps.export import check_export, export
     from hevopt.sweeps.reading import open_to_read
+    from hevopt.writing import check_outs
 
+    check_outs({"--export": out}, [store])
     check_export(out)
-    if out.resolve() == store.resolve():
-        raise DataError(f"--store and --export name one file, {out}; choose two")
     with open_to_read(store) as reader:
         write(f"{export(reader, out)} cases written to {out}")

@@ -2,7 +2,6 @@
 
 import os
 import sys
-from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -19,17 +18,6 @@ _WIDEST = 400
 
 def listed(text: str | None) -> list[str] | None:
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
-
-
-def check_out(out: Path, architecture: str, cycle: str) -> None:
-    """DataError, before anything is solved, where `out` cannot be written or is one of the inputs."""
-    from hevopt.files import find
-    from hevopt.writing import check_writable
-
-    target = check_writable(out)
-    for kind, name, suffix in (("architectures", architecture, ".toml"), ("cycles", cycle, ".csv")):
-        if target.exists() and target.samefile(find(kind, name, suffix)):
-            raise DataError(f"--out {out} is the file that {name} is read from; choose another")
 
 
 def show(table: "Table") -> None:

@@ -306,7 +306,7 @@ BAD = {
     "directions": (lambda r: r, (*MASS, "--directions", "+,x"), ["'x'; allowed: + and -"]),
     "directions twice": (lambda r: r, (*MASS, "--directions", "+,-"), ["in a column and in --directions"]),
     "car": (lambda r: r, (*MASS, "--out", "x.toml"), ["the car file needs tyre_radius_m", "--like NAME"]),
-    "own input": (lambda r: r, (*MASS, "--plot", "c.csv"), ["c.csv is a file that is read"]),
+    "own input": (lambda r: r, (*MASS, "--plot", "c.csv"), ["--plot c.csv is the file that c.csv is read from"]),
     "column": (lambda r: r, (*MASS, "--column", "speed=v"), ["no column 'v'"]),
     "unit": (lambda r: r, (*MASS, "--unit", "speed=rpm"), ["unit 'rpm' is one of rotation"]),
 }  # fmt: skip

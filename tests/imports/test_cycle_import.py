@@ -531,7 +531,7 @@ def test_the_command_prints_assumptions_and_summary_and_writes_only_with_out(
         (["drive.csv"], "give it with --time-unit"),
         (["none.csv"], "no such file"),
         (["."], "a folder"),
-        (["drive.csv", "--out", "drive.csv"], "is the file that is read"),
+        (["drive.csv", "--out", "drive.csv"], "is the file that drive.csv is read from"),
         (["drive.csv", "--out", "cycle"], "ends in .csv"),
         (["drive.csv", "--column", "speed"], "not of the form ROLE=VALUE"),
         (["drive.csv", "--unit", "time=s", "--unit", "time=ms"], "gives time twice"),

@@ -140,10 +140,13 @@ def test_what_pruning_did_or_cannot_do_is_told(tmp_path, monkeypatch, capsys):
         (["study.toml", "--scheduler", "tcp://a:1"], "this machine alone"),
         (["study.toml", "--export", "a.xlsx"], ".csv or .parquet"),
         (["study.toml", "--export", "absent/a.csv"], "No such folder"),
-        (["study.toml", "--store", "study.toml"], "one file"),
+        (
+            ["study.toml", "--store", "study.toml"],
+            "--store study.toml is the file that study.toml is read from",
+        ),
         (["study.toml", "--store", "short.csv"], "nor an SQLite file"),
         (["study.toml", "--store", "done.sqlite", "--no-resume"], "asks for a new store"),
-        (["--store", "done.sqlite", "--export", "done.sqlite"], ".csv or .parquet"),
+        (["--store", "done.sqlite", "--export", "done.sqlite"], "--export done.sqlite is the file"),
     ],
 )
 def test_a_users_mistake_is_one_message_and_status_2(
