@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
-from hevopt.files import find, printable, read_text, shown
+from hevopt.files import find, printable, read_text, shipped_names, shown
 from hevopt.units import TO_SI
 
 _SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
@@ -83,6 +83,11 @@ def load_cycle(name: str | Path) -> Cycle:
         raise DataError(f"{printable(str(name))}: not a cycle file, NAME.csv; {_IMPORT}")
     path = find("cycles", name, ".csv")
     return cycle_of(path, read_text(path, _MEGABYTES_MAX))
+
+
+def shipped_cycles() -> list[Cycle]:
+    """Every shipped cycle, by name."""
+    return [load_cycle(name) for name in shipped_names("cycles", ".csv")]
 
 
 def cycle_of(path: Path, text: str) -> Cycle:

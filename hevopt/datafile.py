@@ -3,7 +3,9 @@
 import re
 import tomllib
 from collections.abc import Iterator
+from copy import deepcopy
 from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -66,7 +68,13 @@ def read_contents(path: Path) -> dict[str, Any]:
     """The file's contents as they stand, keys to values."""
     if path.exists() and not path.is_file() and not path.is_dir():
         raise DataError(f"{path}: not a regular file; give a {path.suffix or '.toml'} file")
-    text, too_deep = read_text(path, _MEGABYTES_MAX), f"{path}: nested too deeply for a data file"
+    return deepcopy(_parsed(path, read_text(path, _MEGABYTES_MAX)))
+
+
+@lru_cache(maxsize=16)
+def _parsed(path: Path, text: str) -> dict[str, Any]:
+    """What a text holds: of a sweep's designs, thousands are made of the same few files."""
+    too_deep = f"{path}: nested too deeply for a data file"
     if _LONG_KEY_PATH.search(text):
         raise DataError(too_deep)
     if sum(1 for _ in _KEY_OR_HEADER.finditer(text)) > 4 * _KEYS_MAX:

@@ -5,6 +5,7 @@ shipped files, which lie inside the installed package, or beside it in a checkou
 """
 
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 
 from hevopt.errors import DataError, unknown_name
@@ -13,6 +14,7 @@ _PACKAGE = Path(__file__).resolve().parent
 _SHOWN_CHARACTERS = 40
 
 
+@cache
 def shipped_folder(kind: str) -> Path:
     """The folder of the shipped files of a kind: 'architectures' or 'cycles'."""
     installed = _PACKAGE / "data" / kind

@@ -126,7 +126,7 @@ def maximise(evaluate: Callable[[float], Line], guess: float) -> list[Line]:
     while right.slope_kg > 0:
         if scale > guess * _SCALE_MAX:
             raise InfeasibleError(
-                "the end charge cannot be reached by any plan; lower soc_end_min or widen the window"
+                "the end charge cannot be reached by any plan; ask for a lower soc_end or widen the window"
             )
         left, right = right, evaluate(scale)
         lines.append(right)

@@ -7,9 +7,11 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from hevopt.architecture import Architecture, load_architecture
 from hevopt.case import Case, prepare, require_nox
-from hevopt.cycle import DISTANCE_MIN_M, Cycle, load_cycle
+from hevopt.cycle import DISTANCE_MIN_M, Cycle, load_cycle, shipped_cycles
 from hevopt.errors import (
     DataError,
     HevoptError,
@@ -216,19 +218,26 @@ def run_case(
 
 
 def _settings(case: Case, strategy: str, horizon_s: float | None) -> dict[str, Any]:
-    """What a strategy is told beyond the problem: its preview, the other cycles it may learn from."""
+    """What a strategy is told beyond the problem: its preview, the shipped cycles but this one to learn from."""
     chosen = strategy_named(strategy)
     settings: dict[str, Any] = {}
     if chosen.previews and horizon_s is not None:
         settings["horizon_s"] = horizon_s
     if chosen.learns:
-        others = [name for name in shipped_names("cycles", ".csv") if name != case.cycle.name]
         weight = case.problem.nox_weight
         settings["training"] = [
-            build_problem(case.car, load_cycle(name), nox_weight=weight, allow_shortfall=True)
-            for name in others
+            build_problem(case.car, other, nox_weight=weight, allow_shortfall=True)
+            for other in shipped_cycles()
+            if not _same_drive(other, case.cycle)
         ]
     return settings
+
+
+def _same_drive(one: Cycle, other: Cycle) -> bool:
+    """Whether two cycles are one drive, under whatever names."""
+    return np.array_equal(one.time_s, other.time_s) and np.array_equal(
+        one.speed_mps, other.speed_mps
+    )
 
 
 def steps_of(cycle: str | Path) -> int:

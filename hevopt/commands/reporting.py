@@ -24,13 +24,14 @@ def report(
     """Write the page of saved results: one HTML file that opens offline."""
     from hevopt.writing import check_outs, write_whole
 
-    check_outs({"--out": out}, [file])
-    write_whole(out, _page(file).encode())
+    page, inputs = _page(file)
+    check_outs({"--out": out}, [file, *inputs])
+    write_whole(out, page.encode())
     write(f"written to {out}")
 
 
-def _page(file: Path) -> str:
-    """The page of a saved comparison, or of a sweep where the file is an SQLite database."""
+def _page(file: Path) -> tuple[str, list[str]]:
+    """The page of a saved comparison, or of a sweep where the file is an SQLite database; the files behind it."""
     try:
         with file.open("rb") as opened:
             is_store = opened.read(len(_SQLITE)) == _SQLITE
@@ -40,11 +41,13 @@ def _page(file: Path) -> str:
         from hevopt.pages.sweep import sweep_page
         from hevopt.pages.sweep_data import load_sweep
 
-        return sweep_page(load_sweep(file))
+        sweep = load_sweep(file)
+        return sweep_page(sweep), list(sweep.inputs)
     from hevopt.pages.comparison import comparison_page
     from hevopt.pages.saved import load_results
 
-    return comparison_page(load_results(file))
+    results = load_results(file)
+    return comparison_page(results), list(results.inputs)
 
 
 def write_files(results: "Results", page: Path | None, saved: Path | None) -> list[str]:

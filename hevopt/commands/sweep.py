@@ -1,30 +1,21 @@
 """`hevopt sweep`: run a study into a store, see how far one is, export it."""
 
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hevopt.commands.reporting import command_line
-from hevopt.commands.sweep_view import (
-    SweepProgress,
-    best_table,
-    counted,
-    discarded,
-    duration,
-    failures,
-)
-from hevopt.commands.terminal import show, write
-from hevopt.errors import DataError, InfeasibleError
+from hevopt.commands.sweep_end import end, export_store, show_status
+from hevopt.commands.sweep_view import SweepProgress, duration
+from hevopt.commands.terminal import write
+from hevopt.errors import DataError
 from hevopt.files import printable
 
 if TYPE_CHECKING:
-    from hevopt.sweeps.reading import Reader
     from hevopt.sweeps.run import Execution, Plan, Progress
     from hevopt.sweeps.signals import Wish
 
-_PARTLY = 4
 _FIRST_CASES = 5
 _NOTHING_TO_PRUNE = (
     "--prune: each design has a NOx weight of its own, none condemns another: nothing is pruned"
@@ -32,6 +23,7 @@ _NOTHING_TO_PRUNE = (
 
 
 def sweep(
+    context: typer.Context,
     study: Annotated[
         Path | None, typer.Argument(help="TOML file of the study.", show_default=False)
     ] = None,
@@ -51,11 +43,15 @@ def sweep(
     ] = None,
     timeout: Annotated[
         float | None,
-        typer.Option("--timeout", min=0.001, help="Seconds after which a case is a failed one."),
+        typer.Option(
+            "--timeout", min=0.001, max=1e6, help="Seconds after which a case is a failed one."
+        ),
     ] = None,
     memory_mb: Annotated[
         float | None,
-        typer.Option("--memory-mb", min=1, help="Address space of a worker's process, MB."),
+        typer.Option(
+            "--memory-mb", min=1, max=1e8, help="Address space of a worker's process, MB."
+        ),
     ] = None,
     prune: Annotated[
         bool,
@@ -85,10 +81,9 @@ def sweep(
     ] = None,
 ) -> None:
     """Solve every design of a study on all cores or a cluster; stopped at any time, it goes on where it was."""
+    _check_given(context)
     if status is not None:
-        if study is not None or export is not None:
-            raise DataError("--status FILE stands alone; leave out the study and --export")
-        _show_status(status)
+        show_status(status)
         return
     if study is None:
         if store is None or export is None:
@@ -96,9 +91,9 @@ def sweep(
                 "name a study, as in `hevopt sweep study.toml`; or `--status FILE`; or `--store FILE "
                 "--export TABLE.csv`"
             )
-        _export(store, export)
+        export_store(store, export)
         return
-    from hevopt.sweeps.run import Execution
+    from hevopt.sweeps.run import Execution, Stopped
     from hevopt.sweeps.signals import wish_to_end
 
     execution = Execution(backend, jobs, scheduler, timeout, memory_mb)
@@ -107,13 +102,32 @@ def sweep(
     with SweepProgress() as progress, wish_to_end() as wish:
         try:
             if dry_run:
-                _rehearse(study, store, execution, prune, progress, wish)
+                _rehearse(study, store, execution, prune, retry_failed, progress, wish)
                 return
-            done = _run(study, store, execution, prune, retry_failed, progress, wish)
-        except KeyboardInterrupt:
+            done = _run(study, store, execution, prune, retry_failed, export, progress, wish)
+        except (KeyboardInterrupt, Stopped):
             done = None
         progress.finish()
-        _end(store, done, export)
+        end(store, done, export)
+
+
+def _check_given(context: typer.Context) -> None:
+    """DataError for what is given beside something that makes it meaningless."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    given = {name for name, source in sources.items() if source and source.name == "COMMANDLINE"}
+    if "status" in given:
+        alone, beside = "--status FILE stands alone", {"status"}
+    elif "study" not in given:
+        alone, beside = "--store FILE --export TABLE.csv without a study", {"store", "export"}
+    elif "dry_run" in given:
+        alone, beside = "--dry-run stores and writes nothing", given - {"export"}
+    else:
+        return
+    options = {name: "--" + name.replace("_", "-") for name in context.params} | {
+        "study": "the study"
+    }
+    if extra := [option for name, option in options.items() if name in given - beside]:
+        raise DataError(f"{alone}; leave out {', '.join(extra)}")
 
 
 def _check(
@@ -141,22 +155,25 @@ def _run(
     execution: "Execution",
     prune: bool,
     retry_failed: bool,
+    export: Path | None,
     progress: SweepProgress,
     wish: "Wish",
-) -> "Progress | None":
-    """How it went; None where it was stopped."""
+) -> "Progress":
+    """How it went. Raises Stopped."""
     from hevopt.sweeps.lock import locked
     from hevopt.sweeps.reading import open_to_read
-    from hevopt.sweeps.run import Stopped, Watch, begin, plan_of, run_sweep
+    from hevopt.sweeps.run import Watch, begin, inputs_of, plan_of, run_sweep
     from hevopt.sweeps.store import open_store
     from hevopt.sweeps.study_file import read_study
+    from hevopt.writing import check_outs
 
     contents = read_study(study)
     with locked(store):
         if store.exists() and store.stat().st_size:
             with open_to_read(store):
                 pass  # one message at once, not after minutes of planning, where it is no store
-        plan = plan_of(contents, prune=prune)
+        plan = plan_of(contents, prune=prune, progress=progress.plan)
+        check_outs({"--export": export}, inputs_of(plan))
         with open_store(store) as opened:
             begin(plan, opened, command_line())
             if prune and not plan.prunable:
@@ -167,14 +184,11 @@ def _run(
                     f"{store} holds {others} results, none that this study asks for as it is now (inputs, "
                     "strategies, hevopt or a library changed): they stay, and everything is run"
                 )
-            try:
-                with wish.held():
-                    return run_sweep(
-                        plan, opened, execution, prune=prune, retry_failed=retry_failed,
-                        watch=Watch(progress, progress.say, wish),
-                    )  # fmt: skip
-            except Stopped:
-                return None
+            with wish.held():
+                return run_sweep(
+                    plan, opened, execution, prune=prune, retry_failed=retry_failed,
+                    watch=Watch(progress, progress.say, wish),
+                )  # fmt: skip
 
 
 def _rehearse(
@@ -182,22 +196,23 @@ def _rehearse(
     store: Path,
     execution: "Execution",
     prune: bool,
+    retry_failed: bool,
     progress: SweepProgress,
     wish: "Wish",
 ) -> None:
     from hevopt.sweeps.designs import merged_values
     from hevopt.sweeps.pools import cores
     from hevopt.sweeps.reading import open_to_read
-    from hevopt.sweeps.run import Watch, plan_of, timed_sample
+    from hevopt.sweeps.run import Watch, plan_of, settled, timed_sample
     from hevopt.sweeps.study_file import read_study
 
     contents = read_study(study)
-    plan = plan_of(contents, prune=prune)
+    plan = plan_of(contents, prune=prune, progress=progress.plan)
     keys = {case.key for case in plan.planned}
     done: set[str] = set()
     if store.exists() and store.stat().st_size:
         with open_to_read(store) as reader:
-            done = keys & reader.keys()
+            done = keys & settled(reader.statuses(), retry_failed=retry_failed)
     _say_plan(plan, len(keys), len(done))
     for key, (asked, distinct) in merged_values(contents).items():
         write(
@@ -230,72 +245,3 @@ def _say_plan(plan: "Plan", cases: int, done: int) -> None:
     for case in plan.planned[:_FIRST_CASES]:
         values = ", ".join(f"{k} = {v}" for k, v in designs[case.design].values.items())
         write(f"  design {case.design} ({values}), {case.cycle}, {case.strategy}")
-
-
-def _end(store: Path, done: "Progress | None", export: Path | None) -> None:
-    """Say what came of it; the exit status says it too."""
-    from hevopt.sweeps.export import export as write_export
-    from hevopt.sweeps.reading import open_to_read
-
-    if done is None and not store.exists():
-        write("stopped before anything was run; the same command starts it")
-        raise typer.Exit(_PARTLY)
-    with open_to_read(store) as reader:
-        counts = reader.counts()
-        if done is not None:
-            _say_results(reader, done)
-        write(counted(counts))
-        if export is not None and done is not None:
-            write(f"{write_export(reader, export)} cases written to {export}")
-    if done is None:
-        write(f"stopped; all results there are lie in {store}; the same command goes on from there")
-        raise typer.Exit(_PARTLY)
-    write(
-        f"results in {store}\n  as a table: hevopt sweep --store {store} --export FILE.csv\n"
-        f"  as a page:  hevopt report {store} --out PAGE.html"
-    )
-    if counts["failed"]:
-        write("--retry-failed runs failed cases once more")
-        raise typer.Exit(
-            _PARTLY if counts["ok"] + counts["infeasible"] else InfeasibleError.exit_status
-        )
-
-
-def _say_results(reader: "Reader", done: "Progress") -> None:
-    took_s = monotonic() - done.began_s
-    pace = f", {done.done / took_s:.3g}/s" if done.done else ""
-    write(f"{done.done} cases run in {duration(took_s)}{pace}; {done.failed} of them failed")
-    _say_standing(reader)
-
-
-def _say_standing(reader: "Reader") -> None:
-    for line in failures(reader):
-        write(line)
-    table, more = best_table(reader)
-    if table is not None:
-        show(table)
-    if more:
-        write(f"and {more} more NOx weights; --export lists them")
-    for line in discarded(reader):
-        write(line)
-
-
-def _show_status(path: Path) -> None:
-    from hevopt.sweeps.reading import open_to_read
-
-    with open_to_read(path) as reader:
-        meta, counts = reader.meta(), reader.counts()
-        write(f"study {printable(meta.get('study_file', 'unknown'))}, begun {meta.get('begun')}")
-        write(counted(counts))
-        _say_standing(reader)
-
-
-def _export(store: Path, out: Path) -> None:
-    from hevopt.sweeps.export import check_export, export
-    from hevopt.sweeps.reading import open_to_read
-    from hevopt.writing import check_outs
-
-    check_outs({"--export": out}, [store])
-    check_export(out)
-    with open_to_read(store) as reader:
-        write(f"{export(reader, out)} cases written to {out}")

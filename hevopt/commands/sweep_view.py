@@ -1,7 +1,7 @@
 """What a sweep shows while it runs and when it ends."""
 
 import sys
-from collections import Counter
+from collections.abc import Iterator
 from math import isfinite
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from hevopt.sweeps.ranking import Ranked
     from hevopt.sweeps.reading import Reader
+    from hevopt.sweeps.reasons import Reason
     from hevopt.sweeps.run import Progress
 
 _LINE_EVERY_S = 10.0
@@ -39,6 +40,12 @@ class SweepProgress:
         elif monotonic() - self._said_s >= _LINE_EVERY_S:
             self._said_s = monotonic()
             self.say(f"{progress.done} of {progress.total} cases, {_pace(progress)}")
+
+    def plan(self, done: int, total: int) -> None:
+        """Called for every car that is read and checked before anything runs."""
+        if monotonic() - self._said_s >= _LINE_EVERY_S:
+            self._said_s = monotonic()
+            self.say(f"planning: {done} of {total} cars checked")
 
     def say(self, text: str) -> None:
         """A line on stderr, above the bar where there is one."""
@@ -101,23 +108,29 @@ def counted(counts: dict[str, int]) -> str:
     return f"{total} cases of {counts['designs']} designs: {listed or 'none'}{other}"
 
 
-def failures(reader: "Reader") -> list[str]:
-    """The most frequent errors of failed cases, each with its number and the first design it befell."""
-    found: Counter[str] = Counter()
-    first: dict[str, int] = {}
+def reasons(reader: "Reader") -> list[str]:
+    """The most frequent errors of failed and infeasible cases, each with its number and the first design it hit."""
+    from hevopt.sweeps.reasons import Reasons
+
+    found = Reasons()
     for record in reader.records():
-        if record.outcome == "failed":
-            error = printable(
-                str(record.error).splitlines()[0] if record.error else "no reason given"
-            )
-            found[error] += 1
-            first.setdefault(error, record.design)
-    lines = []
-    for error, count in found.most_common(_ERRORS_LISTED):
-        text = error if len(error) <= _ERROR_CHARACTERS else error[: _ERROR_CHARACTERS - 3] + "..."
-        lines.append(f"failed {count} times, first in design {first[error]}: {text}")
-    more = len(found) - _ERRORS_LISTED
-    return [*lines, f"and {more} more kinds of failure; --export lists them"] if more > 0 else lines
+        if record.error is not None:
+            found.add(record.outcome, record.error, record.design)
+    return [
+        *_reasons(found.of("failed"), "failed"),
+        *_reasons(found.of("infeasible"), "infeasible"),
+    ]
+
+
+def _reasons(found: "list[Reason]", outcome: str) -> Iterator[str]:
+    for reason in found[:_ERRORS_LISTED]:
+        text = reason.example
+        text = text if len(text) <= _ERROR_CHARACTERS else text[: _ERROR_CHARACTERS - 3] + "..."
+        times = "once" if reason.count == 1 else f"{reason.count} times, first"
+        yield f"{outcome} {times} in design {reason.design}: {text}"
+    if len(found) > _ERRORS_LISTED:
+        more = len(found) - _ERRORS_LISTED
+        yield f"and {more} more kinds of error of {outcome} cases; --export lists them"
 
 
 def discarded(reader: "Reader") -> list[str]:

@@ -33,6 +33,7 @@ from hevopt.provenance import versions
 from hevopt.sweeps.child import code_digest
 from hevopt.sweeps.jobs import NOX_WEIGHT
 from hevopt.sweeps.reading import Record
+from hevopt.sweeps.reasons import first_line
 
 PRUNED_LISTED = 100
 # Entries of the store's meta that have a place of their own on the page.
@@ -75,7 +76,7 @@ def sweep_page(sweep: Sweep) -> str:
         limits={"best": BEST_LISTED, "pruned": PRUNED_LISTED, "cases": CASES_MAX, "designs": DESIGNS_MAX,
                 "lines": LINES_MAX, "best_lines": BEST_LINES, "effects": EFFECTS_DRAWN},
         facts={k: v for k, v in sweep.meta.items() if k not in _SHOWN_APART},
-        inputs=_entries(sweep.meta.get("inputs")),
+        inputs=sweep.inputs,
         computed_by=_entries(sweep.meta.get("versions")),
         versions=versions(),
         same_code=sweep.meta.get("code_digest") == code_digest(),
@@ -144,6 +145,7 @@ def _pruned(sweep: Sweep) -> list[dict[str, Any]]:
 
 def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
     parameters = {k: v for k, v in record.parameters.items() if k != NOX_WEIGHT}
+    error = record.error or ""
     return {
         "design": record.design,
         "weight": record.nox_weight,
@@ -151,7 +153,8 @@ def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
         "cycle": record.cycle,
         "strategy": record.strategy,
         "outcome": record.outcome,
-        "error": record.error,
+        "error": first_line(error),
+        "details": "\n".join(error.splitlines()[1:]),
     }
 
 

@@ -1,6 +1,5 @@
 """What a reader of a sweep must know before believing its verdict."""
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from math import log
@@ -27,12 +26,12 @@ def alerts(sweep: Sweep, groups: Sequence[Group]) -> list[Alert]:
 
 
 def _failed(sweep: Sweep) -> Alert:
-    lines = list(_messages(sweep, "failed"))
+    lines = _reasons(sweep, "failed")
     return Alert("Failed cases", bool(lines), lines or ["No case failed."])
 
 
 def _infeasible(sweep: Sweep) -> Alert:
-    lines = list(_messages(sweep, "infeasible"))
+    lines = _reasons(sweep, "infeasible")
     nothing = "No case is infeasible."
     return Alert("Infeasible cases", bool(lines), lines or [nothing], grave=False)
 
@@ -70,20 +69,17 @@ def _discarded(sweep: Sweep) -> Iterator[Alert]:
         yield Alert("Pruned designs", True, [line], grave=False)
 
 
-def _messages(sweep: Sweep, outcome: str) -> Iterator[str]:
-    """The most frequent messages, those alike but for their numbers as one."""
-    kinds: Counter[str] = Counter()
-    examples: dict[str, str] = {}
-    for (ended, message), count in sweep.tally.messages.items():
-        if ended == outcome:
-            kind = re.sub(r"\d[\d.]*", "#", message)
-            kinds[kind] += count
-            examples.setdefault(kind, message)
-    for kind, count in kinds.most_common(_MESSAGES_LISTED):
-        alike = ", such as" if count > 1 else ""
-        yield f"{count} case{'s' if count > 1 else ''}{alike}: {examples[kind]}"
-    if len(kinds) > _MESSAGES_LISTED:
-        yield f"And {len(kinds) - _MESSAGES_LISTED} other kinds of message."
+def _reasons(sweep: Sweep, outcome: str) -> list[str]:
+    """The most frequent reasons."""
+    found = sweep.tally.reasons.of(outcome)
+    lines = [
+        f"{reason.count} case{'s' if reason.count > 1 else ''}{', such as' if reason.count > 1 else ''} "
+        f"design {reason.design}: {reason.example}"
+        for reason in found[:_MESSAGES_LISTED]
+    ]
+    if len(found) > _MESSAGES_LISTED:
+        lines.append(f"And {len(found) - _MESSAGES_LISTED} other kinds of message.")
+    return lines
 
 
 def _complete(sweep: Sweep) -> Alert:

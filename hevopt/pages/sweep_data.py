@@ -2,13 +2,13 @@
 
 import csv
 import io
+import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import fsum, nan
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import printable
-from hevopt.sweeps.export import export
+from hevopt.sweeps.export import csv_of
 from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
 from hevopt.sweeps.prune import Pruned
-from hevopt.sweeps.reading import Reader, Record, open_to_read
+from hevopt.sweeps.reading import Record, open_to_read
+from hevopt.sweeps.reasons import Reasons
 
 Array = NDArray[np.float64]
 Scalar = bool | int | float | str
@@ -40,6 +41,7 @@ class Solved(NamedTuple):
 
     objective: float
     strategy: str
+    bound: float
     fuel: float
     nox: float
     status: str
@@ -91,13 +93,13 @@ class Figures:
 class Tally:
     """How the cases ended.
 
-    counts: outcome -> cases; messages: (outcome, error) -> cases; failures: the first of those with an error
+    counts: outcome -> cases; reasons: why cases have no result; failures: the first of those with an error
     marks: a row's status other than ok -> cases; cycles, strategies: those planned
     contradictions: cases whose objective is below their own bound
     """
 
     counts: Counter[str] = field(default_factory=Counter)
-    messages: Counter[tuple[str, str]] = field(default_factory=Counter)
+    reasons: Reasons = field(default_factory=Reasons)
     failures: list[Record] = field(default_factory=list)
     marks: Counter[str] = field(default_factory=Counter)
     cycles: dict[str, None] = field(default_factory=dict)
@@ -116,6 +118,11 @@ class Sweep:
     pruned: Sequence[Pruned]
     cases_csv: bytes | None
 
+    @property
+    def inputs(self) -> dict[str, str]:
+        """File -> SHA-256, of the files that it was made from."""
+        return json.loads(self.meta.get("inputs", "{}"))
+
 
 def load_sweep(path: Path) -> Sweep:
     """The sweep of a store, which may be running; DataError where it cannot be read or has no designs."""
@@ -126,16 +133,8 @@ def load_sweep(path: Path) -> Sweep:
         unsolved = set(figures.number[np.isnan(figures.objective)].tolist())
         pruned = [found for found in reader.pruned() if found.design in unsolved]
         few = tally.counts.total() <= CASES_MAX
-        cases_csv = _csv(reader) if few else None
+        cases_csv = csv_of(reader) if few else None
         return Sweep(printable(path.name), reader.meta(), figures, tally, pruned, cases_csv)
-
-
-def _csv(reader: Reader) -> bytes:
-    """The table that `hevopt sweep --export` writes."""
-    with TemporaryDirectory(prefix="hevopt-") as folder:
-        path = Path(folder) / "cases.csv"
-        export(reader, path)
-        return path.read_bytes()
 
 
 def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
@@ -143,7 +142,6 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
     tally = Tally()
     designs: dict[int, tuple[Mapping[str, Scalar], float]] = {}
     best: dict[tuple[int, str], Solved] = {}
-    bounds: dict[tuple[int, str], float] = {}
     duals: dict[tuple[int, str], float] = {}
     worths: list[float] = []
     short: Counter[int] = Counter()
@@ -154,20 +152,18 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
         if row is None:
             continue
         if record.strategy == BOUND:
-            duals[place] = row["bound_l_per_100km"]
+            duals[place] = row["objective_bound_l_per_100km"]
             continue
         short[record.design] = max(short[record.design], _steps_short(row["status"]))
         found = _solved(row)
         best[place] = min(best.get(place, found), found)
-        own = _own_bound(row)
-        tally.contradictions += own > found.objective * (1 + _ROUNDING)
-        bounds[place] = min(bounds.get(place, found.objective), own)
+        tally.contradictions += found.bound > found.objective * (1 + _ROUNDING)
         nox_cost = found.objective - found.fuel
         if nox_cost > _SHARE_MIN * found.objective:
             worths.append(nox_cost / (record.nox_weight * found.nox))
     numbers, cycles = sorted(designs), list(tally.cycles)
     solved = [_mean_solved([best.get((n, cycle)) for cycle in cycles]) for n in numbers]
-    held = [[bounds.get((n, c), duals.get((n, c))) for c in cycles] for n in numbers]
+    held = [[_bound_of(best.get((n, c)), duals.get((n, c))) for c in cycles] for n in numbers]
     figures = Figures(
         number=np.array(numbers),
         values={key: [designs[n][0][key] for n in numbers] for key in _keys(designs)},
@@ -194,7 +190,7 @@ def _count(tally: Tally, record: Record) -> None:
         tally.strategies[record.strategy] = None
     tally.counts[record.outcome] += 1
     if record.error is not None:
-        tally.messages[record.outcome, record.error] += 1
+        tally.reasons.add(record.outcome, record.error, record.design)
         if len(tally.failures) < FAILURES_LISTED:
             tally.failures.append(record)
     if record.row is not None and record.row["status"] != "ok":
@@ -205,6 +201,7 @@ def _solved(row: Mapping[str, Any]) -> Solved:
     return Solved(
         row["objective_l_per_100km"],
         row["strategy"],
+        row["objective_bound_l_per_100km"],
         row["fuel_corrected_l_per_100km"],
         nan if row["nox_mg_per_km"] is None else row["nox_mg_per_km"],
         row["status"],
@@ -217,12 +214,12 @@ def _steps_short(status: str) -> int:
     return int(found[1] or 1) if found else 0
 
 
-def _own_bound(row: Mapping[str, Any]) -> float:
-    """The bound of a row's end charge, charge-corrected as the row's fuel is."""
-    return row["bound_l_per_100km"] - (row["fuel_l_per_100km"] - row["fuel_corrected_l_per_100km"])
+def _bound_of(best: Solved | None, dual: float | None) -> float | None:
+    """What bounds a design's objective on a cycle, rounding aside: its best case's, or else the dual alone."""
+    return dual if best is None else min(best.bound, best.objective)
 
 
-_NOTHING = Solved(nan, "", nan, nan, "")
+_NOTHING = Solved(nan, "", nan, nan, nan, "")
 
 
 def _mean_solved(solved: Sequence[Solved | None]) -> Solved:
@@ -232,6 +229,7 @@ def _mean_solved(solved: Sequence[Solved | None]) -> Solved:
     return Solved(
         fsum(s.objective for s in solved) / len(solved),
         ", ".join(dict.fromkeys(s.strategy for s in solved)),
+        fsum(s.bound for s in solved) / len(solved),
         fsum(s.fuel for s in solved) / len(solved),
         fsum(s.nox for s in solved) / len(solved),
         "; ".join(dict.fromkeys(s.status for s in solved if s.status != "ok")) or "ok",

@@ -177,7 +177,7 @@ def _run(model: Any) -> None:
     if status == cp.INFEASIBLE:
         raise InfeasibleError(
             f"convex: {SOLVER} proves that no mixture of controls keeps the charge within its window and "
-            "reaches the asked end charge; lower soc_end_min or widen the window"
+            "reaches the asked end charge; ask for a lower soc_end or widen the window"
         )
     if status != cp.OPTIMAL:
         raise SolverError(

@@ -68,7 +68,7 @@ def roll(
     if moves < budget:
         raise InfeasibleError(
             f"no path reaches the end: every way stops at {where} at the latest; widen the SOC window, "
-            "lower soc_end_min or allow more switches"
+            "ask for a lower soc_end or allow more switches"
         )
     raise SolverError(
         f"rollout: no way found past {where} within {budget} moves; use a finer energy grid"
@@ -94,7 +94,7 @@ def _why_unreachable(problem: Problem, choices: Choices, end_min_j: float) -> st
     wanted = float(battery_model.soc(problem.battery, end_min_j))
     return (
         f"the end charge cannot be reached: SOC {wanted:.4f} is asked, {best:.4f} is the most any plan "
-        f"reaches at the last step {choices.steps - 1}; lower soc_end_min or give the machine more power"
+        f"reaches at the last step {choices.steps - 1}; ask for a lower soc_end or give the machine more power"
     )
 
 

@@ -205,6 +205,8 @@ class _Team:
             fault = driving.exception()
             if fault is None:
                 return
+            # What ended the workers may ask the caller to end as well.
+            yield []
             self._recover(tasks, fault)
 
     def _drive(self, tasks: _Tasks, deliver: Callable[[Any], None]) -> None:

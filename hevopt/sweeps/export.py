@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping
 from itertools import groupby, islice
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, get_args, get_type_hints
 
 from hevopt.errors import DataError
 from hevopt.files import printable
-from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
+from hevopt.rows import Row
+from hevopt.sweeps.jobs import BOUND, FIGURES, NOX_WEIGHT
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.reading import OUTCOMES, Reader
 from hevopt.writing import check_writable, write_whole
@@ -97,7 +99,19 @@ def _kinds(reader: Reader) -> dict[str, type]:
     pruned = [name for name in _PRUNED if name in found]
     last = [*pruned, *_LAST]
     ordered = [name for name in found if name not in last] + last
-    return {name: _kind_of(found.get(name, set()) - {type(None)}) for name in ordered}
+    known = _known_kinds()
+    kinds = {name: _kind_of(found.get(name, set()) - {type(None)}) for name in ordered}
+    return {name: known.get(name, kind) for name, kind in kinds.items()}
+
+
+def _known_kinds() -> dict[str, type]:
+    """Column name -> what its values are, whether or not the store has one: all columns but the parameters."""
+    figures = dict.fromkeys((*FIGURES, *_PRUNED), float) | {"incumbent": int, "case_s": float}
+    kinds = {
+        name: next(kind for kind in (get_args(hint) or (hint,)) if kind is not NoneType)
+        for name, hint in get_type_hints(Row).items()
+    }
+    return kinds | figures | {"design": int, NOX_WEIGHT: float, "error": str}
 
 
 def _kind_of(kinds: set[type]) -> type:

@@ -9,12 +9,14 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from hevopt.architecture import Architecture, load_architecture
-from hevopt.cycle import Cycle, load_cycle
+from hevopt.cycle import Cycle, load_cycle, shipped_cycles
 from hevopt.provenance import cycle_contents, digest, physics_digest, versions
 
 NOX_WEIGHT = "nox_weight"
 # Not a strategy but the certified bound alone.
 BOUND = "bound"
+# What a stored row has beside the fields of rows.Row; see `Outcome`.
+OBJECTIVE, OBJECTIVE_BOUND = FIGURES = ("objective_l_per_100km", "objective_bound_l_per_100km")
 
 
 class Case(NamedTuple):
@@ -44,7 +46,8 @@ class Job:
 class Outcome:
     """What came of a case. status: "ok", "infeasible" (proven or found impossible) or "failed", with the error.
 
-    row: the fields of rows.Row but solve_s, and `objective_l_per_100km`: charge-corrected fuel + weighted NOx
+    row: the fields of rows.Row but solve_s; `objective_l_per_100km`: charge-corrected fuel + weighted NOx;
+    `objective_bound_l_per_100km`: what no plan with at least that row's end charge can undercut
     seconds: time it took, the table and the dynamic program going to the first case that needed them
     """
 
@@ -87,12 +90,25 @@ def jobs_of(
     """A job per car and cycle, with the designs that its cases belong to.
 
     groups: changes of the car -> (design, NOx weight) of the designs that share it. Designs of one weight share
-    cases. Raises DataError where a changed key is not allowed, before the job is handed out.
+    cases. Before a job is handed out: DataError where a changed key is not allowed, UnknownNoxError for a weight on
+    NOx where the engine has no data on it.
     """
+    # Workers import this module too, and leave what solves to their processes.
+    from hevopt.case import require_nox
+    from hevopt.strategies import STRATEGIES
+
     common = {"code": physics_digest(), "versions": versions(), "allow_shortfall": allow_shortfall}
     traces = {cycle: load_cycle(cycle) for cycle in cycles}
+    learning = {name for name, strategy in STRATEGIES.items() if strategy.learns}.intersection(
+        strategies
+    )
+    teachers = [cycle_contents(cycle) for cycle in shipped_cycles()] if learning else None
+    taught = {name: [digest(teachers)] for name in learning}
     for changes, members in groups:
         car = load_architecture(architecture, changes)
+        heaviest = max(weight for _, weight in members)
+        if heaviest > 0:
+            require_nox(car, f"{NOX_WEIGHT} {heaviest:g}")
         for cycle in cycles:
             inputs = inputs_digest(car, traces[cycle])
             made_of = digest({**common, "inputs": inputs})
@@ -101,7 +117,7 @@ def jobs_of(
             for design, given in members:
                 weight = float(given)
                 for strategy in strategies:
-                    key = digest([made_of, weight, strategy])
+                    key = digest([made_of, weight, strategy, *taught.get(strategy, ())])
                     cases[weight, strategy] = Case(key, weight, strategy)
                     planned.append(Planned(design, cycle, strategy, weight, key))
             solved = tuple(cases.values())

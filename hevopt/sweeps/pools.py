@@ -129,6 +129,8 @@ def _ray(workers: int | None, scheduler: str | None) -> Pool:
         where = {"num_cpus": workers or cores(), "include_dashboard": False}
         # Where memory runs out, the system ends the process of a case; Ray would end its worker, time after time.
         os.environ.setdefault("RAY_memory_monitor_refresh_ms", "0")
+        # Ray's workers give way to everything else on the machine unless told otherwise.
+        os.environ.setdefault("RAY_worker_niceness", "0")
     try:
         ray.init(
             address=scheduler or "local", log_to_driver=False, logging_level=logging.CRITICAL, **where

@@ -30,7 +30,7 @@ class Ranked:
 def best_designs(reader: Reader, count: int) -> dict[float, list[Ranked]]:
     """NOx weight -> its best designs, the best first, those that do not follow a cycle after all others.
 
-    Designs of different weights have no common objective.
+    Designs of different weights have no common objective. Unsolved ones are ranked where no other is solved.
     """
     best: dict[float, list[Ranked]] = {}
     for ranked in _ranked(reader):
@@ -39,7 +39,11 @@ def best_designs(reader: Reader, count: int) -> dict[float, list[Ranked]]:
             listed.append(ranked)
             listed.sort(key=_order)
             del listed[count:]
-    return dict(sorted(best.items()))
+    return {weight: _solved_first(listed) for weight, listed in sorted(best.items())}
+
+
+def _solved_first(ranked: list[Ranked]) -> list[Ranked]:
+    return [design for design in ranked if design.objective is not None] or ranked
 
 
 def _order(ranked: Ranked) -> tuple[bool, bool, float, int]:
@@ -65,10 +69,7 @@ def _ranked(reader: Reader) -> Iterator[Ranked]:
 def _bound_of_best(records: Sequence[Record]) -> float | None:
     solved = [r for r in records if _figure(r, "objective_l_per_100km") is not None]
     chosen = min(solved, key=lambda r: r.row["objective_l_per_100km"]) if solved else records[0]
-    bound = _figure(chosen, "bound_l_per_100km")
-    if not solved or bound is None:
-        return bound
-    return bound - (chosen.row["fuel_l_per_100km"] - chosen.row["fuel_corrected_l_per_100km"])
+    return _figure(chosen, "objective_bound_l_per_100km")
 
 
 def _figure(record: Record, name: str) -> float | None:

@@ -52,10 +52,10 @@ class Reader:
         with told(self.path):
             return dict(self.connection.execute("SELECT name, value FROM meta"))
 
-    def keys(self) -> set[str]:
-        """Keys of all cases that have a result."""
+    def statuses(self) -> dict[str, str]:
+        """Key -> status of all cases that have a result."""
         with told(self.path):
-            return {key for (key,) in self.connection.execute("SELECT key FROM cases")}
+            return dict(self.connection.execute("SELECT key, status FROM cases"))
 
     def counts(self) -> dict[str, int]:
         """Cases of the plan by outcome; `designs`; `other`: results of other plans or other code."""

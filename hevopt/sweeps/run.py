@@ -1,7 +1,7 @@
 """A sweep from its study to its store: plan, leave out what the store has, run the rest, store it as it comes."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -19,7 +19,7 @@ from hevopt.sweeps.store import Store
 from hevopt.sweeps.study_file import SweepStudy
 
 WORK = "hevopt.sweeps.work:run_job"
-_SAMPLES = 4
+_SAMPLES, _SAMPLE_WEIGHTS = 4, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +87,16 @@ class Stopped(Exception):
     """`Watch.stop` said so; everything there was is stored."""
 
 
-def plan_of(study: SweepStudy, *, prune: bool = False) -> Plan:
-    """Every case of a study; DataError where a design is no car. prune: each design's bound is a case as well."""
+def plan_of(
+    study: SweepStudy,
+    *,
+    prune: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Plan:
+    """Every case of a study; DataError where a design is no car. prune: each design's bound is a case as well.
+
+    progress: called with the number of cars on a cycle planned so far, and of all
+    """
     strategies = list(study.strategies)
     if prune and strategies == [BOUND]:
         raise DataError(
@@ -97,40 +105,44 @@ def plan_of(study: SweepStudy, *, prune: bool = False) -> Plan:
     if prune and BOUND not in strategies:
         strategies.append(BOUND)
     designs = designs_of(study)
+    groups = groups_of(designs)
     found = jobs_of(
-        study.architecture, study.cycles, strategies, groups_of(designs),
-        allow_shortfall=study.allow_shortfall,
-    )  # fmt: skip
+        study.architecture, study.cycles, strategies, groups, allow_shortfall=study.allow_shortfall
+    )
     jobs, planned = [], []
     for job, cases in found:
         jobs.append(job)
         planned += cases
+        progress(len(jobs), len(groups) * len(study.cycles))
     return Plan(study, designs, jobs, planned)
+
+
+def inputs_of(plan: Plan) -> Mapping[str, str]:
+    """File -> SHA-256, of all files that a plan is made from."""
+    study = plan.study
+    cycles = map(load_cycle, study.cycles)
+    return files_digests(cars_of(study, plan.designs), cycles, [study.source])
 
 
 def begin(plan: Plan, store: Store, command: str) -> None:
     """Make a plan the store's."""
     study = plan.study
     text = study.source.read_text(encoding="utf-8-sig")
-    cycles = map(load_cycle, study.cycles)
-    inputs = files_digests(cars_of(study, plan.designs), cycles, [study.source])
     meta = {
         "study": text,
         "study_digest": digest(text),
         "code_digest": code_digest(),
         "versions": json.dumps(versions()),
-        "inputs": json.dumps(inputs),
+        "inputs": json.dumps(inputs_of(plan)),
         "command": command,
         "study_file": str(study.source.absolute()),
     }
     store.begin(meta, ((d.number, d.values) for d in plan.designs), plan.planned)
 
 
-def settled(store: Store, *, retry_failed: bool) -> set[str]:
+def settled(statuses: Mapping[str, str], *, retry_failed: bool) -> set[str]:
     """Keys of the cases that need not be run: infeasible is a result, and failed unless it is to be tried again."""
-    return {
-        key for key, status in store.statuses().items() if status != "failed" or not retry_failed
-    }
+    return {key for key, status in statuses.items() if status != "failed" or not retry_failed}
 
 
 def run_sweep(
@@ -146,7 +158,7 @@ def run_sweep(
 
     What is stored does not depend on backend and workers, except for the seconds. Raises Stopped.
     """
-    done = settled(store, retry_failed=retry_failed)
+    done = settled(store.statuses(), retry_failed=retry_failed)
     missing = {case.key for case in plan.planned} - done
     progress = Progress(len(missing))
     with ExitStack() as stack:
@@ -266,14 +278,15 @@ def timed_sample(
 ) -> Sample | None:
     """A few jobs from all over the plan, run one after the other on one worker; None where none is missing.
 
-    The first one loads and compiles, and counts for the estimate only where it is alone.
+    The first one loads and compiles, and counts for the estimate only where it is alone. Of a job with many NOx
+    weights the first few are run.
     """
     jobs = list(plan.picked(missing))
     if not jobs:
         return None
     last = len(jobs) - 1
     places = dict.fromkeys(round(n * last / _SAMPLES) for n in range(_SAMPLES + 1))
-    chosen: Sequence[Job] = [jobs[place] for place in places]
+    chosen = [_with_few_weights(jobs[place]) for place in places]
     spent: dict[str, float] = {}
     began_s = ended_s = monotonic()
     with workers(execution.terms(), count=1, notice=watch.notice) as run:
@@ -282,7 +295,12 @@ def timed_sample(
             ended_s = monotonic()
             if watch.stop():
                 raise Stopped
-    warm = chosen[1:] or chosen
-    mean_s = sum(spent[case.key] for job in warm for case in job.cases) / len(warm)
-    startup_s = max(0.0, ended_s - began_s - mean_s * len(chosen))
-    return Sample(len(spent), sum(spent.values()), startup_s, mean_s * len(jobs))
+    warm = [case for job in chosen[1:] or chosen for case in job.cases]
+    mean_s = sum(spent[case.key] for case in warm) / len(warm)
+    startup_s = max(0.0, ended_s - began_s - mean_s * len(spent))
+    return Sample(len(spent), sum(spent.values()), startup_s, mean_s * len(missing))
+
+
+def _with_few_weights(job: Job) -> Job:
+    weights = list(dict.fromkeys(case.nox_weight for case in job.cases))[:_SAMPLE_WEIGHTS]
+    return replace(job, cases=tuple(case for case in job.cases if case.nox_weight in weights))

@@ -20,7 +20,7 @@ from hevopt.prices import one_price_dual
 from hevopt.problem import Problem
 from hevopt.rows import Row, shortfall_marks
 from hevopt.study import run_case
-from hevopt.sweeps.jobs import BOUND, Case, Job, Outcome, inputs_digest
+from hevopt.sweeps.jobs import BOUND, FIGURES, Case, Job, Outcome, inputs_digest
 from hevopt.units import litres_per_100km
 
 _ONE_MULTIPLIER = "one multiplier"
@@ -96,18 +96,23 @@ def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, A
         bound_l_per_100km=_litres(car, cycle, bound_kg),
         certificate=f"{proof}, {SCOPE}",
     )
-    return _stored(row, None)
+    return _stored(row, None, row.bound_l_per_100km)
 
 
 def _strategy_row(solved: SolvedCase, strategy: str) -> dict[str, Any]:
     row, _, trajectory = run_case(solved, strategy)
     surplus_j = trajectory.end_j - solved.problem.end_min_j
-    objective_kg = trajectory.cost_kg - solved.certificate.price_kgpj * surplus_j
-    return _stored(row, _litres(solved.car, solved.cycle, objective_kg))
+    worth_kg = solved.certificate.price_kgpj * surplus_j
+    bound_kg, _ = solved.certificate.bound_kg(trajectory.end_j)
+    objective, bound = (
+        _litres(solved.car, solved.cycle, mass_kg - worth_kg)
+        for mass_kg in (trajectory.cost_kg, bound_kg)
+    )
+    return _stored(row, objective, bound)
 
 
-def _stored(row: Row, objective: float | None) -> dict[str, Any]:
-    values = row.as_dict() | {"objective_l_per_100km": objective}
+def _stored(row: Row, objective: float | None, bound: float | None) -> dict[str, Any]:
+    values = row.as_dict() | dict(zip(FIGURES, (objective, bound), strict=True))
     del values["solve_s"]
     if any(isinstance(value, float) and not isfinite(value) for value in values.values()):
         raise SolverError("a figure is not finite; the design is too far from a car")

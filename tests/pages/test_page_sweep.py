@@ -25,7 +25,7 @@ from hevopt.pages.sweep_front import boundary, lines_boundary, pareto
 from hevopt.pages.sweep_verdict import groups_of, verdict
 from hevopt.rows import Row
 from hevopt.sweeps.export import export
-from hevopt.sweeps.jobs import Outcome, Planned
+from hevopt.sweeps.jobs import FIGURES, Outcome, Planned
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.reading import Record, open_to_read
 from hevopt.sweeps.run import begin, plan_of
@@ -43,7 +43,7 @@ machine.power_max_w = [12e3, 24e3]
 nox_weight = [0, 10]
 """
 PER_NOX = 0.1 / 835
-FIELDS = [f.name for f in fields(Row) if f.name != "solve_s"] + ["objective_l_per_100km"]
+FIELDS = [f.name for f in fields(Row) if f.name != "solve_s"] + [*FIGURES]
 
 
 def row_of(fuel, nox, weight, *, bound=None, strategy="dp", status="ok", gained=0.0):
@@ -53,7 +53,7 @@ def row_of(fuel, nox, weight, *, bound=None, strategy="dp", status="ok", gained=
     return dict.fromkeys(FIELDS) | {
         "architecture": "X", "strategy": strategy, "status": status, "fuel_l_per_100km": fuel,
         "nox_mg_per_km": nox, "fuel_corrected_l_per_100km": fuel - gained, "bound_l_per_100km": bound,
-        "gap_percent": 0.0, "objective_l_per_100km": objective,
+        "gap_percent": 0.0, "objective_l_per_100km": objective, "objective_bound_l_per_100km": bound - gained,
     }  # fmt: skip
 
 
@@ -109,9 +109,9 @@ def test_a_bound_is_charge_corrected_as_the_row_is_and_never_above_its_objective
 
 
 def test_bounds_alone_rank_designs_where_nothing_else_was_asked_for():
-    bound = {"strategy": "bound", "status": "ok", "bound_l_per_100km": 3.0}
+    row = dict.fromkeys(FIELDS) | {"strategy": "bound", "status": "ok"}
     records = [
-        record(n, dict.fromkeys(FIELDS) | bound | {"bound_l_per_100km": b}, strategy="bound")
+        record(n, row | {"objective_bound_l_per_100km": b}, strategy="bound")
         for n, b in enumerate([3.0, 2.5, 4.0])
     ]
     sweep = sweep_of(records)

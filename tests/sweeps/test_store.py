@@ -65,7 +65,7 @@ def test_a_result_is_on_disk_after_half_a_second_or_two_hundred_rows(tmp_path):
 
     def on_disk():
         with open_to_read(path) as reader:
-            return len(reader.keys())
+            return len(reader.statuses())
 
     with open_store(path) as store:
         store.add([ok("a")])

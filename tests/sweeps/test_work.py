@@ -7,7 +7,7 @@ from hevopt.case import prepare
 from hevopt.errors import SolverError
 from hevopt.rows import Row
 from hevopt.study import run_case
-from hevopt.sweeps.jobs import Case, Job, jobs_of
+from hevopt.sweeps.jobs import FIGURES, Case, Job, jobs_of
 from hevopt.sweeps.work import run_job
 
 CHANGES = {"battery.cells_in_series": 48, "machine.power_max_w": 14e3}
@@ -28,13 +28,18 @@ def test_a_job_gives_the_rows_that_a_comparison_would():
     assert {k: v for k, v in stored.items() if k in row.as_dict()} == {
         k: v for k, v in row.as_dict().items() if k != "solve_s"
     }
-    assert set(stored) == (set(Row.__dataclass_fields__) - {"solve_s"}) | {"objective_l_per_100km"}
+    assert set(stored) == (set(Row.__dataclass_fields__) - {"solve_s"}) | set(FIGURES)
     # By hand: weighted cost less the worth of what the charge has gained, as a volume.
     gained_j = trajectory.end_j - case.problem.start_j
     cost_kg = trajectory.total_fuel_kg + 10 * trajectory.total_nox_kg
     corrected_kg = cost_kg - case.certificate.price_kgpj * gained_j
     litres = corrected_kg / 0.835 / case.cycle.distance_m * 1e5
     assert stored["objective_l_per_100km"] == pytest.approx(litres, rel=1e-12)
+    # The row's own bound is for its end charge; that of the objective is corrected as the objective is.
+    worth = row.fuel_l_per_100km - row.fuel_corrected_l_per_100km
+    corrected = row.bound_l_per_100km - worth
+    assert stored["objective_bound_l_per_100km"] == pytest.approx(corrected, rel=1e-12)
+    assert stored["objective_bound_l_per_100km"] <= stored["objective_l_per_100km"]
 
 
 def test_no_objective_lies_below_the_bound_that_pruning_uses():
