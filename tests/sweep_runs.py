@@ -69,7 +69,7 @@ def start(study, *options, **how):
 def run(study, *options, status=0, **how):
     """What `hevopt sweep` says on stdout and stderr."""
     process = start(study, *options, **how)
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=300)
     assert process.returncode == status, f"{process.returncode}\n{out}\n{err}"
     return out, err
 
@@ -79,7 +79,7 @@ def session(process):
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            fields = fields_of(folder)
             command = (folder / "cmdline").read_text().replace("\0", " ")
         except OSError:
             continue
@@ -88,7 +88,20 @@ def session(process):
     return found
 
 
-def gone(process, within_s=10.0):
+def fields_of(folder):
+    """What the system tells of a process from its state on."""
+    return (folder / "stat").read_text().rpartition(")")[2].split()
+
+
+def alive(pid):
+    """Whether a process runs; one that has ended and is still listed does not."""
+    try:
+        return fields_of(Path(f"/proc/{pid}"))[0] != "Z"
+    except OSError:
+        return False
+
+
+def gone(process, within_s=30.0):
     """Whether all processes of a sweep end by themselves."""
     deadline = time.monotonic() + within_s
     while session(process):
@@ -112,7 +125,7 @@ def stored(store):
 
 
 def wait_for_results(process, store, count):
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while stored(store) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline

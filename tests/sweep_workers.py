@@ -123,6 +123,15 @@ def act(what):
             blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
             deaf = signal.SIGINT in blocked
             return {"pid": os.getpid(), "worker": os.getppid(), "deaf": deaf}
+        case ["meet", folder, count]:
+            # Until as many processes are there as are expected.
+            open(os.path.join(folder, str(os.getpid())), "w").close()
+            deadline = time.monotonic() + 60
+            while len(os.listdir(folder)) < count and time.monotonic() < deadline:
+                time.sleep(0.02)
+            return act("pids")
+        case "rest":
+            time.sleep(1.0)
         case "threads":
             return _threads()
         case "raise":

@@ -73,8 +73,9 @@ def _reasons(sweep: Sweep, outcome: str) -> list[str]:
     """The most frequent reasons."""
     found = sweep.tally.reasons.of(outcome)
     lines = [
-        f"{reason.count} case{'s' if reason.count > 1 else ''}{', such as' if reason.count > 1 else ''} "
-        f"design {reason.design}: {reason.example}"
+        f"{reason.count} cases, such as design {reason.design}: {reason.example}"
+        if reason.count > 1
+        else f"1 case, design {reason.design}: {reason.example}"
         for reason in found[:_MESSAGES_LISTED]
     ]
     if len(found) > _MESSAGES_LISTED:

@@ -302,7 +302,9 @@ def test_failures_alike_but_for_numbers_are_one_line_and_the_most_frequent_comes
     errors = ["rare"] + [f"no control at step {n} (t = {n}.5 s)" for n in range(5)]
     sweep = sweep_of([record(n, None, outcome="failed", error=e) for n, e in enumerate(errors)])
     found, lines = said(sweep, "Failed cases")
-    assert found and lines == ["5 cases, such as: no control at step 0 (t = 0.5 s)", "1 case: rare"]
+    assert found and lines == [
+        "5 cases, such as design 1: no control at step 0 (t = 0.5 s)", "1 case, design 0: rare",
+    ]  # fmt: skip
     assert said(sweep, "Infeasible cases") == (False, ["No case is infeasible."])
 
 

@@ -9,6 +9,7 @@ import time
 
 import pytest
 import sweep_workers
+from sweep_runs import alive
 
 from hevopt.errors import DataError, SolverError
 from hevopt.sweeps.backends import workers
@@ -31,15 +32,7 @@ def by_key(outcomes):
     return found
 
 
-def alive(pid):
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def ended(pids, within_s=5.0):
+def ended(pids, within_s=30.0):
     deadline = time.monotonic() + within_s
     while any(map(alive, pids)) and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -50,10 +43,12 @@ def ended(pids, within_s=5.0):
     ("backend", "count"),
     [("loky", 2), pytest.param("loky", 1, marks=pytest.mark.long), ("dask", 2), ("ray", 2)],
 )
-def test_a_backend_has_as_many_workers_as_asked_outside_this_process(backend, count, monkeypatch):
+def test_a_backend_has_as_many_workers_as_asked_outside_this_process(
+    backend, count, monkeypatch, tmp_path
+):
     # Ray's workers do not share this process' path.
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
-    jobs = sweep_workers.jobs(12, 2, dict.fromkeys(range(0, 24, 2), "pids"))
+    jobs = sweep_workers.jobs(12, 2, {n: ["meet", str(tmp_path), count] for n in range(0, 24, 2)})
     with workers(WORK, backend=backend, count=count) as run:
         found = by_key(outcome for outcomes in run(jobs) for outcome in outcomes)
         again = by_key(outcome for outcomes in run(jobs[:2]) for outcome in outcomes)
@@ -82,7 +77,7 @@ def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_pat
         1: "raise", 4: "hang", 8: "hang in C", 10: "hang and shrug", 13: "die", 17: "unstorable", 20: "nan",
         25: "exit", 30: ["die once", marker], 35: "hang and garble",
     }  # fmt: skip
-    terms = Terms("sweep_workers:work", timeout_s=0.5, loading_s=0.0)
+    terms = Terms("sweep_workers:work", timeout_s=1.0, loading_s=0.0)
     found = by_key(outcomes_of(sweep_workers.jobs(20, 2, does), terms, count=2))
     assert set(found) == {f"k{n}" for n in range(40)}
     errors = {int(key[1:]): o.error for key, o in found.items() if o.status == "failed"}
@@ -90,7 +85,7 @@ def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_pat
     assert set(errors) == set(does) - {30} | {24}
     expected = {
         1: "not today", 13: "signal 9.*twice", 17: "cannot be stored", 20: "cannot be stored", 25: "SystemExit",
-    } | dict.fromkeys((4, 8, 10, 35), "^timeout: took more than 0.5 s$")  # fmt: skip
+    } | dict.fromkeys((4, 8, 10, 35), "^timeout: took more than 1 s$")  # fmt: skip
     for number, words in expected.items():
         assert re.search(words, errors[number]), errors[number]
     assert os.path.exists(marker)
@@ -151,9 +146,8 @@ def test_killed_workers_lose_nothing_and_double_nothing(backend):
 
 
 def test_closed_early_the_workers_are_gone_and_what_came_is_kept():
-    jobs = sweep_workers.jobs(400, 1, dict.fromkeys(range(400), "pids"))
-    began = time.monotonic()
-    outcomes = []
+    jobs = sweep_workers.jobs(4000, 1, dict.fromkeys(range(4000), "pids"))
+    began, threads, outcomes = time.monotonic(), set(threading.enumerate()), []
     with workers(WORK, count=2) as run:
         arrivals = run(jobs)
         for found in arrivals:
@@ -161,14 +155,35 @@ def test_closed_early_the_workers_are_gone_and_what_came_is_kept():
             if len(outcomes) > 5:
                 break
         arrivals.close()
-    assert time.monotonic() - began < 15  # all of them take 20 s
+    assert time.monotonic() - began < 100  # all of them take 200 s
     assert ended({o.row[name] for o in outcomes for name in ("pid", "worker")})
-    assert threading.active_count() < 10
+    # The one that watches over what processes share stays as long as Python does.
+    assert len(set(threading.enumerate()) - threads) <= 1
 
 
 def test_the_caller_is_heard_while_nothing_comes():
-    with workers(Terms("sweep_workers:slow"), count=1) as run:
-        assert [] in list(run(sweep_workers.jobs(12, 1)))
+    """Not only while the worker starts: between two outcomes as well."""
+    jobs = sweep_workers.jobs(3, 1, {1: "rest"})
+    with workers(WORK, count=1) as run:
+        arrivals = list(run(jobs))
+    first, last = (n for n, found in enumerate(arrivals) if found and found[0].key in ("k0", "k1"))
+    assert [] in arrivals[first:last]
+
+
+def test_a_caller_that_stops_when_workers_end_is_not_told_of_a_loss():
+    """As where a signal ends a whole group of processes: the caller sees its own before the loss is told."""
+    notices = []
+    with workers(WORK, count=1, notice=notices.append) as run:
+        arrivals = run(sweep_workers.jobs(50, 1, dict.fromkeys(range(50), "pids")))
+        worker = next(o.row["worker"] for found in arrivals for o in found)
+        os.kill(worker, signal.SIGKILL)
+        while alive(worker):
+            time.sleep(0.01)
+        for found in arrivals:
+            if not found:
+                break
+        arrivals.close()
+    assert not notices
 
 
 @pytest.mark.parametrize(

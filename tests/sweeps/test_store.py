@@ -5,13 +5,13 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import pytest
 from sweep_runs import check_sound
 
 from hevopt.errors import DataError
+from hevopt.sweeps import store as store_module
 from hevopt.sweeps.jobs import Outcome, Planned
 from hevopt.sweeps.lock import locked
 from hevopt.sweeps.prune import Pruned
@@ -60,8 +60,9 @@ def test_a_result_is_never_replaced_and_a_failure_is(tmp_path):
     check_sound(path)
 
 
-def test_a_result_is_on_disk_after_half_a_second_or_two_hundred_rows(tmp_path):
-    path = filled(tmp_path / "s.sqlite", [])
+def test_a_result_is_on_disk_after_half_a_second_or_two_hundred_rows(tmp_path, monkeypatch):
+    path, now = filled(tmp_path / "s.sqlite", []), [100.0]
+    monkeypatch.setattr(store_module, "monotonic", lambda: now[0])
 
     def on_disk():
         with open_to_read(path) as reader:
@@ -71,7 +72,7 @@ def test_a_result_is_on_disk_after_half_a_second_or_two_hundred_rows(tmp_path):
         store.add([ok("a")])
         store.add([])
         assert on_disk() == 0
-        time.sleep(0.5)
+        now[0] += 0.5
         store.add([])
         assert on_disk() == 1
         store.add([ok(f"b{n}") for n in range(199)])

@@ -70,7 +70,7 @@ def test_the_parent_is_killed_at_a_random_moment(study, whole, tmp_path, rounds)
             time.sleep(random.uniform(0.0, 0.1) * took_s)
         kill(process.pid)
         assert gone(process), session(process)
-        process.communicate(timeout=10)
+        process.communicate(timeout=60)
         check_sound(store)
         had = stored(store)
         interrupted += 0 < had < len(expected) - 1
@@ -92,7 +92,7 @@ def test_workers_whose_parent_is_killed_before_their_first_task_end_too(study, t
         time.sleep(0.005)
     kill(process.pid)
     assert gone(process), session(process)
-    process.communicate(timeout=10)
+    process.communicate(timeout=60)
 
 
 def workers_of(process):

@@ -197,6 +197,23 @@ def test_the_sample_for_an_estimate_is_run_and_not_stored(tmp_path):
     assert timed_sample(plan, set(), Execution(), Watch()) is None
 
 
+def test_of_many_nox_weights_the_sample_takes_a_few(tmp_path):
+    study = write_study(tmp_path, 5, 4)
+    study.write_text(study.read_text().replace("[0, 10]", "{ from = 0, to = 99, count = 100 }"))
+    plan = plan_of(read_study(study))
+    missing = {case.key for case in plan.planned}
+    sample = timed_sample(plan, missing, Execution(work="sweep_workers:work"), Watch())
+    assert sample.cases == 5 * 3 and sample.total_s == pytest.approx(2000 * 0.001)
+
+
+def test_planning_tells_how_far_it_is(tmp_path):
+    seen = []
+    plan = plan_of(
+        read_study(write_study(tmp_path, 5, 4)), progress=lambda *count: seen.append(count)
+    )
+    assert seen == [(n + 1, 20) for n in range(20)] and len(plan.jobs) == 20
+
+
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 MEMORY = """
 import re, sys

@@ -4,7 +4,8 @@ import pytest
 
 from hevopt import load_architecture, load_cycle
 from hevopt.case import prepare
-from hevopt.errors import SolverError
+from hevopt.errors import SolverError, UnknownNoxError
+from hevopt.files import shipped_folder
 from hevopt.rows import Row
 from hevopt.study import run_case
 from hevopt.sweeps.jobs import FIGURES, Case, Job, jobs_of
@@ -62,6 +63,37 @@ def test_a_key_says_everything_that_can_change_a_result_and_nothing_else():
     written = dict(CHANGES, hybrid_mass_kg=70, description="another")
     same = next(jobs_of("C2", ["nedc"], ["dp"], [(written, [(7, 0)])]))[1]
     assert other[0].key not in keys and same[0].key in keys
+
+
+def test_what_a_strategy_learns_from_is_in_its_key_and_in_no_other(monkeypatch):
+    def keys():
+        jobs = jobs_of("C2", ["nedc"], ["sdp", "dp", "bound"], [({}, [(0, 0.0)])])
+        return {planned.strategy: planned.key for planned in next(jobs)[1]}
+
+    before = keys()
+    monkeypatch.setattr("hevopt.sweeps.jobs.shipped_cycles", lambda: [load_cycle("udds")])
+    after = keys()
+    assert {name for name in before if before[name] != after[name]} == {"sdp"}
+
+
+def test_a_copy_of_a_shipped_cycle_teaches_no_more_than_the_cycle_itself(tmp_path):
+    (tmp_path / "mine.csv").write_bytes((shipped_folder("cycles") / "hwfet.csv").read_bytes())
+    rows = []
+    for cycle in ("hwfet", str(tmp_path / "mine.csv")):
+        ((job, planned),) = jobs_of("C2", [cycle], ["sdp"], [({}, [(0, 0.0)])])
+        rows.append((planned[0].key, run_job(job)[0].row))
+    # One drive under two names: one key, and so it must be one result.
+    assert rows[0] == rows[1]
+
+
+def test_a_weight_on_unknown_nox_is_found_before_anything_runs(tmp_path):
+    engine = shipped_folder("architectures") / "components/engine_diesel_1600.toml"
+    without = engine.read_text().split("[nox_coefficients]")[0]
+    (tmp_path / "engine.toml").write_text(without)
+    changes = {"engine": str(tmp_path / "engine.toml")}
+    with pytest.raises(UnknownNoxError, match="nox_weight 5 needs NOx data"):
+        list(jobs_of("C2", ["nedc"], ["dp"], [(changes, [(0, 0.0), (1, 5.0)])]))
+    assert list(jobs_of("C2", ["nedc"], ["dp"], [(changes, [(0, 0.0)])]))
 
 
 def test_an_exception_is_an_outcome_and_the_other_cases_go_on():
