@@ -42,6 +42,12 @@ class SocFile(FileModel):
             raise ValueError(f"start {self.start:g} must lie in [{self.min:g}, {self.max:g}]")
         if self.end is not None and not self.min <= self.end <= self.max:
             raise ValueError(f"end {self.end:g} must lie in [{self.min:g}, {self.max:g}]")
+        least = self.start if self.end is None else self.end
+        if least == self.max:
+            raise ValueError(
+                f"the least charge at the end, {least:g}, is max itself, which no plan meets exactly; give end a "
+                "value below max, such as 0.01 less, or raise max"
+            )
         return self
 
 

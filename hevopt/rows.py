@@ -71,7 +71,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
         fuel_l_per_100km=litres(fuel_kg),
         co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
         nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km if car.engine.nox_known else None,
-        soc_start=float(trajectory.soc[0]),
+        soc_start=problem.soc_start,
         soc_end=float(trajectory.soc[-1]),
         delta_energy_percent=_percent(surplus_j, fuel_j),
         fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * surplus_j),

@@ -136,8 +136,6 @@ def _beside(path: Path, changes: Mapping[str, Any]) -> dict[str, Any]:
     for key in COMPONENTS:
         if isinstance(value := changes.get(key), str):
             changes[key] = beside_study(path, value, ".toml")
-        elif isinstance(value, dict) and isinstance(value.get("file"), str):
-            changes[key] = {**value, "file": beside_study(path, value["file"], ".toml")}
     return changes
 
 
@@ -237,13 +235,16 @@ def _why(setting: str, cars: Sequence[str]) -> str:
 
 
 def _flat(table: Mapping[str, Any], at: str = "") -> dict[str, Any]:
-    """Key path -> value of nested tables; a component given as a table of its own stays one."""
+    """Key path -> value of nested tables; of a component given as a table, its file and what replaces its keys."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
         path = f"{at}.{key}" if at else key
-        whole = path in COMPONENTS and isinstance(value, dict) and "file" in value
-        inner = isinstance(value, dict) and value and not whole
-        for found, leaf in (_flat(value, path) if inner else {path: value}).items():
+        leaves = {path: value}
+        if isinstance(value, dict) and value:
+            inner = dict(value)
+            file = {path: inner.pop("file")} if path in COMPONENTS and "file" in inner else {}
+            leaves = file | _flat(inner, path)
+        for found, leaf in leaves.items():
             if found in flat:
                 raise DataError(f"set {printable(found)} is given twice; leave one out")
             flat[found] = leaf
