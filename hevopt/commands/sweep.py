@@ -201,9 +201,10 @@ def _rehearse(
     wish: "Wish",
 ) -> None:
     from hevopt.sweeps.designs import merged_values
+    from hevopt.sweeps.estimate import timed_sample
     from hevopt.sweeps.pools import cores
     from hevopt.sweeps.reading import open_to_read
-    from hevopt.sweeps.run import Watch, plan_of, settled, timed_sample
+    from hevopt.sweeps.run import Watch, plan_of, settled
     from hevopt.sweeps.study_file import read_study
 
     contents = read_study(study)

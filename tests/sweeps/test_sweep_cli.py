@@ -119,7 +119,7 @@ def test_a_dry_run_that_is_stopped_says_so(tmp_path, monkeypatch, capsys):
     def stopped(*_, **__):
         raise Stopped
 
-    monkeypatch.setattr("hevopt.sweeps.run.timed_sample", stopped)
+    monkeypatch.setattr("hevopt.sweeps.estimate.timed_sample", stopped)
     status, out, err = called(monkeypatch, capsys, study, "--dry-run")
     assert status == 4 and "stopped" in out and err == ""
 

@@ -15,10 +15,11 @@ from sweep_runs import check_sound, stored, sweep_here, table, write_study
 
 import hevopt
 from hevopt.errors import DataError
+from hevopt.sweeps.estimate import timed_sample
 from hevopt.sweeps.prune import WAVES
 from hevopt.sweeps.ranking import best_designs
 from hevopt.sweeps.reading import open_to_read
-from hevopt.sweeps.run import Execution, Stopped, Watch, plan_of, timed_sample
+from hevopt.sweeps.run import Execution, Stopped, Watch, plan_of
 from hevopt.sweeps.study_file import read_study
 from hevopt.sweeps.work import run_job
 
