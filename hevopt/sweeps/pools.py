@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from hevopt.errors import DataError
@@ -50,11 +51,23 @@ def check_backend(backend: str, scheduler: str | None) -> None:
         if backend == "dask":
             import distributed  # noqa: F401
         elif backend == "ray":
+            if scheduler is not None:
+                _show_token()
             import ray  # noqa: F401
     except ImportError:
         raise DataError(
             f'backend {backend} is not installed; run: pip install "hevopt[{backend}]"'
         ) from None
+
+
+def _show_token() -> None:
+    """Have Ray, once it is loaded, show the user's token, if there is one, to a cluster that asks for it.
+
+    It does so by itself for a cluster that it finds or starts, not for one named by its address.
+    """
+    path = os.environ.get("RAY_AUTH_TOKEN_PATH", Path.home() / ".ray" / "auth_token")
+    if "RAY_AUTH_TOKEN" in os.environ or Path(path).is_file():
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
 
 
 def cores() -> int:

@@ -3,13 +3,17 @@
 import os
 import re
 import signal
+import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import sweep_workers
-from sweep_runs import alive
+from sweep_runs import alive, table, write_study
+from sweep_runs import run as swept
 
 from hevopt.errors import DataError, SolverError
 from hevopt.sweeps.backends import workers
@@ -96,6 +100,44 @@ def test_a_case_that_eats_memory_is_its_own_failure():
     found = by_key(outcomes_of(sweep_workers.jobs(2, 2, {1: "eat"}), terms, count=1))
     assert [found[f"k{n}"].status for n in range(4)] == ["ok", "failed", "ok", "ok"]
     assert "MemoryError" in found["k1"].error
+
+
+@contextmanager
+def dask_cluster():
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, memory_limit=0, dashboard_address="127.0.0.1:0"
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+@contextmanager
+def ray_cluster():
+    """A cluster as `ray start` makes it, which asks for a token wherever the user has one."""
+    command = [str(Path(sys.executable).with_name("ray"))]
+    head = ["start", "--head", "--port=6399", "--num-cpus=2", "--include-dashboard=false"]
+    subprocess.run([*command, *head], check=True, capture_output=True)
+    try:
+        yield "127.0.0.1:6399"
+    finally:
+        subprocess.run([*command, "stop"], check=True, capture_output=True)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("backend", "cluster"), [("dask", dask_cluster), ("ray", ray_cluster)])
+def test_a_cluster_that_runs_already_gives_the_same_results_and_goes_on_running(
+    tmp_path, backend, cluster
+):
+    study = write_study(tmp_path, 3, 2)
+    swept(study, "--jobs", "1")
+    expected = table(tmp_path / "study.sqlite")
+    with cluster() as address:
+        for name in ("one", "two"):
+            store = tmp_path / f"{name}.sqlite"
+            words = ("--backend", backend, "--scheduler", address, "--store", str(store))
+            swept(study, *words)
+            assert table(store) == expected
 
 
 @pytest.mark.parametrize(("work", "words"), [("raises", "all of it"), ("forgets", "no outcome")])
