@@ -5,7 +5,7 @@ the name's suffix or the convention of a known tool; where none says it, whoever
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import printable, shown
+from hevopt.imports.measured_cells import Cells
 from hevopt.imports.measured_names import (
     base_of,
     unit_by_convention,
@@ -41,7 +42,7 @@ class Column:
     unit: as the file writes it, None where nothing says it; source: how it is known
     values: (row,) NaN where the cell is empty or no number; strange: (row, text) of the first cells that are no
     numbers, strange_count of them in all; words: rows of each such text, of the first few texts
-    against: another unit that the file states, and how
+    against: another unit that the file states, and how; fixed: whether the cells themselves carry the unit
     """
 
     name: str
@@ -52,6 +53,7 @@ class Column:
     strange_count: int = 0
     words: Mapping[str, Sequence[int]] = field(default_factory=dict)
     against: tuple[str, str] | None = None
+    fixed: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,19 +147,37 @@ def _columns(path: Path, table: Table) -> list[Column]:
             unit, source = convention[name]
         stated = [convention[name]] if name in convention else units_in_name(name)
         against = next((s for s in stated if unit and unit_named(s[0]) != unit_named(unit)), None)
-        strange, count = cells.strange, cells.strange_count
-        values = cells.values()
-        if cells.clock_count and not cells.number_count:
-            unit, source, against = "s", "dates or times of day", None
-        elif cells.clock_count:  # neither a column of numbers nor one of times
-            line, text = cells.found["clock"]
-            strange = [(int(np.searchsorted(table.lines, line)), text), *strange]
-            count += cells.clock_count
-        values.flags.writeable = False
-        columns.append(
-            Column(name, unit, values, source, tuple(strange), count, cells.words, against)
-        )
+        column = Column(
+            name, unit, cells.values(), source, tuple(cells.strange), cells.strange_count, cells.words, against
+        )  # fmt: skip
+        column = _carrying_units(column, cells, table)
+        column.values.flags.writeable = False
+        columns.append(column)
     return columns
+
+
+def _carrying_units(column: Column, cells: Cells, table: Table) -> Column:
+    """The column whose cells are dates, times of day or per cent: these are never scaled by another unit."""
+    plain = cells.number_count - cells.percent_count
+    for kind, count, others, unit, what in (
+        ("clock", cells.clock_count, cells.number_count, "s", "dates or times of day"),
+        ("percent", cells.percent_count, plain + cells.clock_count, "%", "cells in per cent"),
+    ):
+        if not count:
+            continue
+        if others:  # neither a column of numbers nor one of these
+            line, text = cells.found[kind]
+            strange = ((int(np.searchsorted(table.lines, line)), text), *column.strange)
+            column = replace(column, strange=strange, strange_count=column.strange_count + count)
+            continue
+        known, own = unit_named(column.unit) if column.unit else None, unit_named(unit)
+        against = None
+        if kind == "percent" and column.unit and (known is None or known.quantity != own.quantity):
+            against = (column.unit, column.source)
+        elif column.unit and known != own:
+            what += f"; {column.unit} of the {column.source} is not applied"
+        column = replace(column, unit=unit, source=what, against=against, fixed=True)
+    return column
 
 
 def column_named(measured: Measured, name: str) -> Column:
@@ -218,6 +238,11 @@ def in_si(
     """
     given, source = (unit, option) if unit is not None else (column.unit, column.source)
     known = known_unit(measured, column, given, allowed, option)
+    if column.fixed and known != unit_named(column.unit):
+        raise DataError(
+            f"{measured.path}: column {column.name} holds {column.source}, which are never taken in "
+            f"{shown(unit)}; leave {option} out"
+        )
     if unit is None:
         _refuse_contradiction(measured, column, allowed, option)
     if column.strange and not text_as_empty:

@@ -31,7 +31,8 @@ _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _PERHAPS_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '’\u00a0\u202f][0-9]{3})+(?:[.,][0-9]+)?")
 _DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}[ T][0-9]{2}:[0-9]{2}.*")
-_CLOCK = re.compile(r"([0-9]{1,3}):([0-9]{2}):([0-9]{2}(?:[.,][0-9]+)?)")
+_PERCENT = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s?%")
+_CLOCK = re.compile(r"([0-9]{1,6}):([0-9]{2}):([0-9]{2}(?:[.,][0-9]+)?)")
 
 
 @dataclass(slots=True)
@@ -39,7 +40,7 @@ class Cells:
     """A column while it is read. `found` maps a way of writing to the first line and cell that has it.
 
     strange: (row, text) of cells that are neither numbers nor empty; words: rows of each text among them, of the
-    first few texts; clock: rows with dates or times of day
+    first few texts; clock: rows with dates or times of day; percent: rows with numbers such as 3 %
     """
 
     chunks: list[NDArray[np.float64]] = field(default_factory=list)
@@ -48,6 +49,7 @@ class Cells:
     words: dict[str, array] = field(default_factory=dict)
     found: dict[str, tuple[int, str]] = field(default_factory=dict)
     clock_count: int = 0
+    percent_count: int = 0
     number_count: int = 0
     slow_count: int = 0
     first_date: datetime | None = None
@@ -59,7 +61,7 @@ class Cells:
 
 def is_value(text: str) -> bool:
     """Whether a cell could be one of a data row: a number, a date or a time of day."""
-    return any(p.fullmatch(text) for p in (_POINT, _COMMA, _THOUSANDS, _DATE, _CLOCK))
+    return any(p.fullmatch(text) for p in (_POINT, _COMMA, _PERCENT, _THOUSANDS, _DATE, _CLOCK))
 
 
 def is_empty(text: str) -> bool:
@@ -135,12 +137,17 @@ def _slow(column: Cells, cell: str, line: int, row: int) -> float:
 
 def _number(column: Cells, cell: str, line: int) -> float | None:
     """A number, or the seconds of a date or a time of day; None where a cell is neither."""
+    percent = _PERCENT.fullmatch(cell)
+    cell = cell[:-1].rstrip() if percent else cell
     point = _POINT.fullmatch(cell)
     if point or _COMMA.fullmatch(cell):
         value = float(cell.replace(",", "."))
         if abs(value) > LARGEST:
             return None
         column.number_count += 1
+        if percent:
+            column.percent_count += 1
+            column.found.setdefault("percent", (line, f"{cell}%"))
         if "," in cell:
             kind = "comma" if _is_decimal(cell, ",") else "perhaps thousands"
             column.found.setdefault(kind, (line, cell))

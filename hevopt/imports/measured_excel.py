@@ -1,18 +1,21 @@
 """Excel workbooks to tables, within limits that hold before a workbook is unpacked."""
 
+import re
 import warnings
 import zipfile
 from collections.abc import Iterator
 from datetime import date, datetime, time, timedelta
+from functools import cache
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hevopt.errors import DataError, unknown_name
 from hevopt.files import printable
 from hevopt.imports.measured_rows import Row, Table, runs, table_of
 
 if TYPE_CHECKING:
+    from openpyxl.cell.read_only import ReadOnlyCell
     from openpyxl.workbook import Workbook
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
@@ -21,6 +24,8 @@ _UNPACKED_MAX = 200_000_000
 _SHEET_CELLS_MAX = 400_000
 _TAGS_MAX = 8 * _SHEET_CELLS_MAX
 _BLOCK_BYTES = 1_000_000
+# Parts of a number format that are shown as they stand, as the sign in 0.0" %" is; a bare % shows hundredths.
+_FORMAT_TEXT = re.compile(r'"[^"]*"|[\\_*].|\[[^\]]*\]')
 
 
 def excel_table(path: Path, contents: bytes, sheet: str | None) -> Table:
@@ -103,22 +108,23 @@ def _sheet_rows(path: Path, book: "Workbook", sheet: str | None) -> tuple[str, l
 def _rows_of(path: Path, sheet: "ReadOnlyWorksheet") -> Iterator[Row]:
     sheet.reset_dimensions()  # what a file says of its own size may be wrong
     cells_read = 0
-    for number, row in enumerate(sheet.iter_rows(values_only=True), start=1):
+    for number, row in enumerate(sheet.iter_rows(), start=1):
         cells_read += max(len(row), 1)
         if cells_read > _SHEET_CELLS_MAX:
             raise DataError(
                 f"{path}, sheet {printable(sheet.title)!r}, row {number}: more than {_SHEET_CELLS_MAX} "
                 "cells; save the sheet as CSV, or keep fewer columns"
             )
-        cells = [_text(value) for value in row]
+        cells = [_text(cell) for cell in row]
         while cells and not cells[-1]:
             cells.pop()
         if cells:
             yield number, cells
 
 
-def _text(value: Any) -> str:
-    """A cell as a text file would have it."""
+def _text(cell: "ReadOnlyCell") -> str:
+    """A cell as a text file would have it: durations as H:MM:SS, what is shown in per cent with its sign."""
+    value = cell.value
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -130,5 +136,22 @@ def _text(value: Any) -> str:
     if isinstance(value, time):
         return value.isoformat()
     if isinstance(value, timedelta):
-        return _text(value.total_seconds())
-    return repr(value).removesuffix(".0") if isinstance(value, int | float) else str(value).strip()
+        return _duration(value)
+    if not isinstance(value, int | float):
+        return str(value).strip()
+    if _in_percent(cell.number_format):
+        return f"{value * 100:.15g}%"
+    return repr(value).removesuffix(".0")
+
+
+def _duration(value: timedelta) -> str:
+    minutes, seconds = divmod(value, timedelta(minutes=1))
+    if minutes < 0:
+        return f"{value} (a duration below 0)"
+    micro = f".{seconds.microseconds:06}" if seconds.microseconds else ""
+    return f"{minutes // 60}:{minutes % 60:02}:{seconds.seconds:02}{micro}"
+
+
+@cache
+def _in_percent(number_format: str) -> bool:
+    return "%" in _FORMAT_TEXT.sub("", number_format)
