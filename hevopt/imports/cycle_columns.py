@@ -170,7 +170,9 @@ def _values(
         notes.append(f"{role}: {column.name}")
         return column.values
     option = _OPTIONS.get(role, f"--unit {role}=UNIT")
-    found = in_si(measured, column, _QUANTITIES[role], option, unit, text_as_empty=True)
+    # A stop that cannot be read would be left out of the drive; other cells are faults that a repair may mend.
+    mendable = role != "stop"
+    found = in_si(measured, column, _QUANTITIES[role], option, unit, text_as_empty=mendable)
     notes.append(f"{role}: {found.note}")
     if found.quantity == "angle":
         return np.tan(found.values)

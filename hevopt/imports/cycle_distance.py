@@ -15,6 +15,7 @@ from hevopt.errors import DataError
 from hevopt.imports.cycle_columns import Drive
 from hevopt.imports.cycle_fault_list import Faults, refused
 from hevopt.imports.cycle_faults import ACCELERATION_MAX_MPS2, SMALLEST_MPS, held_columns
+from hevopt.imports.measured_rows import runs
 from hevopt.units import KMH_PER_MPS
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ def over_time(drive: Drive, acceleration_mps2: float | None) -> Drive:
             f"--acceleration {acceleration_mps2:g}; allowed: above 0 to {ACCELERATION_MAX_MPS2:.2f} m/s²"
         )
     distance_m, speed_mps = drive.distance_m, drive.speed_mps
-    stop_s = np.zeros_like(speed_mps) if drive.stop_s is None else np.nan_to_num(drive.stop_s)
+    stop_s, said = _stops(drive)
     _check(drive, distance_m, speed_mps, stop_s, acceleration_mps2)
     if acceleration_mps2 is None:
         trace = _joined(distance_m, speed_mps, stop_s)
@@ -65,7 +66,16 @@ def over_time(drive: Drive, acceleration_mps2: float | None) -> Drive:
     names = ("lines", "grade", "altitude_m", "gear", "clutch_open")
     part = {n: values[row] for n in names if (values := getattr(drive, n)) is not None}
     part |= {"time_s": np.array(trace.time_s), "speed_mps": np.array(trace.speed_mps)}
-    return replace(drive, notes=(*drive.notes, rule), **part)
+    return replace(drive, notes=(*drive.notes, *said, rule), **part)
+
+
+def _stops(drive: Drive) -> tuple[Array, list[str]]:
+    """(row,) stop times, 0 where the cell is empty, and a note of these."""
+    if drive.stop_s is None:
+        return np.zeros_like(drive.speed_mps), []
+    empty = ~np.isfinite(drive.stop_s)
+    said = [f"stop: empty in {runs(drive.lines[empty].tolist())}, taken as 0 s"] * bool(empty.any())
+    return np.where(empty, 0.0, drive.stop_s), said
 
 
 def _check(

@@ -59,13 +59,11 @@ def _repaired(drive: Drive, faults: Faults) -> Drive:
     """
     drive = past_midnight(drive, faults)
     kept = times_in_order(drive, faults)
+    if len(kept) < 2:
+        raise DataError(f"{drive.measured.path}: one line; a drive needs at least 2")
     if kept.sum() < 2:
-        faults.add(
-            drive.lines[-1], "ends", "the drive ends with {} lines of a time in order", kept.sum()
-        )
-        raise refused(
-            drive.measured.path, faults, "a drive needs at least 2; check the column of time"
-        )
+        advice = "fewer than 2 lines have a time in order; a drive needs at least 2: check the column of time"
+        raise refused(drive.measured.path, faults, advice)
     drive = _rows_of(drive, kept)
     report_gaps(drive, faults)
     speed_mps = _speeds(drive, faults)
