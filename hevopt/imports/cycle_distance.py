@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError
 from hevopt.imports.cycle_columns import Drive
 from hevopt.imports.cycle_fault_list import Faults, refused
-from hevopt.imports.cycle_faults import ACCELERATION_MAX_MPS2, SMALLEST_MPS, held_columns
+from hevopt.imports.cycle_faults import SMALLEST_MPS, held_columns
+from hevopt.imports.cycle_spikes import ACCELERATION_MAX_MPS2
 from hevopt.imports.measured_rows import runs
 from hevopt.units import KMH_PER_MPS
 

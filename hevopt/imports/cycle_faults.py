@@ -1,8 +1,4 @@
-"""What is wrong with a logged drive, line by line, and the repairs that a user may ask for.
-
-A speed may change by the friction of tyres on a dry road times the time between two samples, and by the sensor's
-smallest step, up to 1 km/h; what changes faster is a spike.
-"""
+"""What is wrong with a logged drive, line by line, and the repairs that a user may ask for."""
 
 from dataclasses import replace
 
@@ -13,16 +9,14 @@ from hevopt.cycle import GRADE_MAX, SPEED_MAX_MPS
 from hevopt.errors import DataError
 from hevopt.imports.cycle_columns import Drive
 from hevopt.imports.cycle_fault_list import Faults, empty_cell, refused
+from hevopt.imports.cycle_spikes import spikes, text_of
 from hevopt.imports.cycle_times import past_midnight, report_gaps, times_in_order
-from hevopt.units import KMH_PER_MPS, STANDARD_GRAVITY_MPS2
+from hevopt.units import KMH_PER_MPS
 
 Array = NDArray[np.float64]
 
-TYRE_FRICTION = 1.0
-ACCELERATION_MAX_MPS2 = TYRE_FRICTION * STANDARD_GRAVITY_MPS2
 # A car that is slower rests.
 SMALLEST_MPS = 1e-3
-_RESOLUTION_MAX_MPS = 1.0001 / KMH_PER_MPS
 _GEAR_MAX = 20
 # A file with more to repair than this share of its lines is not a log with a few faults.
 _REPAIRED_SHARE_MAX = 0.25
@@ -105,18 +99,11 @@ def _speeds(drive: Drive, faults: Faults) -> Array:
             *(np.array([speed[row], SPEED_MAX_MPS]) * KMH_PER_MPS),
         )
     kept &= ~(speed > SPEED_MAX_MPS)
-    for row, other in _spikes(drive.time_s, speed, np.flatnonzero(kept)):
-        kept[row] = False
-        if negative[row]:
-            continue
-        step_s = abs(drive.time_s[row] - drive.time_s[other])
-        faults.add(
-            lines[row], "spikes",
-            "speed {:.4g} km/h against {:.4g} km/h of line {}, {:g} s apart: {:.3g} m/s², more than tyres hold "
-            "({:.2f} m/s²); drawn between its neighbours",
-            speed[row] * KMH_PER_MPS, speed[other] * KMH_PER_MPS, lines[other], step_s,
-            abs(speed[row] - speed[other]) / step_s, ACCELERATION_MAX_MPS2,
-        )  # fmt: skip
+    for spike in spikes(drive.time_s, speed, np.flatnonzero(kept)):
+        kept[spike.row] = False
+        if not negative[spike.row]:
+            text, values = text_of(spike, drive.time_s, speed, lines)
+            faults.add(lines[spike.row], "spikes", text, *values)
     for row in np.flatnonzero(negative):
         how = (
             "set to 0" if kept[row] else "drawn between its neighbours, against which 0 is a spike"
@@ -124,31 +111,6 @@ def _speeds(drive: Drive, faults: Faults) -> Array:
         text = "speed {:.4g} km/h is negative; {}"
         faults.add(lines[row], "negative speeds", text, drive.speed_mps[row] * KMH_PER_MPS, how)
     return np.interp(drive.time_s, drive.time_s[kept], speed[kept]) if kept.any() else speed
-
-
-def _spikes(time_s: Array, speed_mps: Array, rows: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Rows whose speeds tyres could not bring about, each with the good row that it is held against.
-
-    The first of two rows in a series that agree is good, and then each that tyres reach from the last good one.
-    """
-    times, speeds = time_s[rows], speed_mps[rows]
-    changes = np.abs(np.diff(speeds))
-    resolution = float(min(changes[changes > 0], default=0.0))
-    resolution = (resolution if resolution <= _RESOLUTION_MAX_MPS else 0.0) + 1e-9
-    agree = changes <= ACCELERATION_MAX_MPS2 * np.diff(times) + resolution
-    if agree.all():
-        return []
-    good = int(np.argmax(agree))
-    spikes = [(int(rows[i]), int(rows[good])) for i in range(good)]
-    last_s, last_mps = times[good], speeds[good]
-    for i, t, v in zip(
-        range(good + 1, len(rows)), times[good + 1 :], speeds[good + 1 :], strict=True
-    ):
-        if abs(v - last_mps) <= ACCELERATION_MAX_MPS2 * (t - last_s) + resolution:
-            good, last_s, last_mps = i, t, v
-        else:
-            spikes.append((int(rows[i]), int(rows[good])))
-    return spikes
 
 
 def _held(drive: Drive, name: str, faults: Faults) -> Array | None:
