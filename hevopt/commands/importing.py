@@ -41,6 +41,13 @@ def import_cycle(
             help="m/s² with which target speeds over distance are followed, as in VECTO's cycles."
         ),
     ] = None,
+    standstill: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SPEED",
+            help="Slower than this for 3 s or longer, the car counts as standing, such as 0.5km/h.",
+        ),
+    ] = None,
     repair: Annotated[
         bool, typer.Option("--repair", help="Mend faults in the data; every change is listed.")
     ] = False,
@@ -48,6 +55,7 @@ def import_cycle(
 ) -> None:
     """Read a drive in another tool's shape, check it, resample it to 1 Hz; write it with --out."""
     from hevopt.imports import cycle_import
+    from hevopt.imports.cycle_standstill import standstill_limit
     from hevopt.writing import write_whole
 
     if out is not None:
@@ -65,6 +73,7 @@ def import_cycle(
     imported = cycle_import.import_cycle(
         file, columns=_pairs("--column", column), units=units, sheet=sheet, repair=repair,
         acceleration_mps2=acceleration,
+        standstill_mps=None if standstill is None else standstill_limit(standstill),
     )  # fmt: skip
     _show(imported)
     if out is None:
@@ -86,6 +95,8 @@ def _show(imported: "Imported") -> None:
         write("\n  ".join([heading, *imported.repairs]))
     for name, text in summary(imported):
         write(f"{name:18}{text}")
+    for text in imported.hints:
+        write(text)
 
 
 def _pairs(option: str, given: list[str] | None) -> dict[str, str]:

@@ -15,6 +15,7 @@ from hevopt.files import printable
 from hevopt.imports.cycle_columns import Drive, drive_of
 from hevopt.imports.cycle_distance import over_time
 from hevopt.imports.cycle_faults import sound
+from hevopt.imports.cycle_standstill import never_at_rest, standing
 from hevopt.imports.cycle_times import long_steps
 from hevopt.imports.measured import read_measured
 from hevopt.imports.resample import (
@@ -43,6 +44,7 @@ class Imported:
 
     text: the cycle file; assumptions: how the file was read; rules: how the cycle was made; repairs: by line
     distance_m: as the source has it after the repairs, between samples at uneven times
+    hints: what the user may want to change
     """
 
     source: Path
@@ -52,6 +54,7 @@ class Imported:
     assumptions: tuple[str, ...]
     rules: tuple[str, ...]
     repairs: tuple[str, ...]
+    hints: tuple[str, ...]
 
 
 def import_cycle(
@@ -62,31 +65,41 @@ def import_cycle(
     sheet: str | None = None,
     repair: bool = False,
     acceleration_mps2: float | None = None,
+    standstill_mps: float | None = None,
 ) -> Imported:
     """The cycle in a measured file; DataError with every fault by line where it has any and `repair` is not set.
 
     columns, units: role (time, speed, distance, stop, grade, altitude, gear, clutch_open) to a column's name, unit
     acceleration_mps2: with which the target speeds of a drive over distance are followed
+    standstill_mps: slower than which for a while the car counts as standing
     """
     measured = read_measured(path, sheet=sheet)
     drive = drive_of(measured, columns or {}, units or {})
+    hints: list[str] = []
     if drive.time_s is None:
-        drive, repairs, long = over_time(drive, acceleration_mps2), [], []
+        if standstill_mps is not None:
+            raise DataError(f"{measured.path}: a drive over distance; leave --standstill out")
+        drive, repairs, changes = over_time(drive, acceleration_mps2), [], []
+        distance_m = _distance(drive)[-1]
     elif acceleration_mps2 is not None:
         raise DataError(f"{measured.path}: a drive over time; leave --acceleration out")
     else:
         drive, repairs = sound(drive, repair)
-        long = long_steps(drive)
+        changes = long_steps(drive)
+        distance_m = _distance(drive)[-1]
+        if standstill_mps is None:
+            hints = never_at_rest(drive)
+        else:
+            drive, counted = standing(drive, standstill_mps)
+            changes += counted
     sampled, rules = _at_one_hertz(drive)
-    rules += long
-    assumptions = (*measured.notes, *drive.notes)
+    assumptions, rules = (*measured.notes, *drive.notes), (*rules, *changes)
     told = [*(f"read as: {text}" for text in assumptions), *(f"made by: {text}" for text in rules)]
-    text = _text(path, measured.path, told, repairs, sampled)
-    distance_m = float(_distance(drive)[-1])
+    text = _text(path, measured.path, told + hints, repairs, sampled)
     cycle = _checked(measured.path, text)
     return Imported(
-        measured.path, cycle, text, distance_m, assumptions, tuple(rules), tuple(repairs)
-    )
+        measured.path, cycle, text, float(distance_m), assumptions, rules, tuple(repairs), tuple(hints)
+    )  # fmt: skip
 
 
 def summary(imported: Imported) -> list[tuple[str, str]]:
