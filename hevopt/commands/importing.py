@@ -48,6 +48,12 @@ def import_cycle(
             help="Slower than this for 3 s or longer, the car counts as standing, such as 0.5km/h.",
         ),
     ] = None,
+    altitude_baseline: Annotated[
+        float | None,
+        typer.Option(
+            help="Metres of road over which grade is taken from altitude; chosen by its noise without this."
+        ),
+    ] = None,
     repair: Annotated[
         bool, typer.Option("--repair", help="Mend faults in the data; every change is listed.")
     ] = False,
@@ -74,6 +80,7 @@ def import_cycle(
         file, columns=_pairs("--column", column), units=units, sheet=sheet, repair=repair,
         acceleration_mps2=acceleration,
         standstill_mps=None if standstill is None else standstill_limit(standstill),
+        altitude_baseline_m=altitude_baseline,
     )  # fmt: skip
     _show(imported)
     if out is None:

@@ -12,6 +12,7 @@ from hevopt import __version__
 from hevopt.cycle import SAMPLES_MAX, Cycle, cycle_of
 from hevopt.errors import DataError
 from hevopt.files import printable
+from hevopt.imports.altitude import grade_from_altitude
 from hevopt.imports.cycle_columns import Drive, drive_of
 from hevopt.imports.cycle_distance import over_time
 from hevopt.imports.cycle_faults import sound
@@ -20,7 +21,6 @@ from hevopt.imports.cycle_times import long_steps
 from hevopt.imports.measured import read_measured
 from hevopt.imports.resample import (
     distance_at,
-    grades_from_altitude,
     mean_grades,
     one_hertz_times,
     rows_at,
@@ -66,11 +66,13 @@ def import_cycle(
     repair: bool = False,
     acceleration_mps2: float | None = None,
     standstill_mps: float | None = None,
+    altitude_baseline_m: float | None = None,
 ) -> Imported:
     """The cycle in a measured file; DataError with every fault by line where it has any and `repair` is not set.
 
     columns, units: role (time, speed, distance, stop, grade, altitude, gear, clutch_open) to a column's name, unit
     acceleration_mps2: with which the target speeds of a drive over distance are followed
+    altitude_baseline_m: length of road over which grade is taken from altitude, None for one chosen by its noise
     standstill_mps: slower than which for a while the car counts as standing
     """
     measured = read_measured(path, sheet=sheet)
@@ -92,7 +94,12 @@ def import_cycle(
         else:
             drive, counted = standing(drive, standstill_mps)
             changes += counted
-    sampled, rules = _at_one_hertz(drive)
+    if altitude_baseline_m is not None and drive.altitude_m is None:
+        raise DataError(
+            f"{measured.path}: --altitude-baseline without an altitude; name it with --column altitude=NAME"
+        )
+    sampled, rules, noticed = _at_one_hertz(drive, altitude_baseline_m)
+    hints = [*hints, *noticed]
     assumptions, rules = (*measured.notes, *drive.notes), (*rules, *changes)
     told = [*(f"read as: {text}" for text in assumptions), *(f"made by: {text}" for text in rules)]
     text = _text(path, measured.path, told + hints, repairs, sampled)
@@ -136,8 +143,10 @@ def _distance(drive: Drive) -> Array:
     return distance_at(drive.time_s, drive.speed_mps, drive.time_s)
 
 
-def _at_one_hertz(drive: Drive) -> tuple[dict[str, Array], list[str]]:
-    """Columns of the cycle file, and the rules by which they were made."""
+def _at_one_hertz(
+    drive: Drive, altitude_baseline_m: float | None
+) -> tuple[dict[str, Array], list[str], list[str]]:
+    """Columns of the cycle file, the rules by which they were made, and hints."""
     start_s = float(drive.time_s[0])
     time_s = drive.time_s - start_s
     duration_s = round(float(time_s[-1]), _TIME_DIGITS)
@@ -157,10 +166,12 @@ def _at_one_hertz(drive: Drive) -> tuple[dict[str, Array], list[str]]:
         if (values := getattr(drive, name)) is not None:
             columns[name] = values[row]
             rules.append(f"{name}: the last sample's")
-    grade = drive.grade
+    grade, hints = drive.grade, []
     if drive.altitude_m is not None:
-        grade = grades_from_altitude(_distance(drive), drive.altitude_m)
-        rules.append("grade from altitude, between points at least 20 m apart")
+        road = grade_from_altitude(_distance(drive), drive.altitude_m, altitude_baseline_m)
+        grade = road.grade
+        rules.append(road.rule)
+        hints += [road.hint] * bool(road.hint)
     elif drive.grade_ends:
         grade = np.append(grade[1:], grade[-1])
     if grade is not None:
@@ -171,7 +182,7 @@ def _at_one_hertz(drive: Drive) -> tuple[dict[str, Array], list[str]]:
             else "to the next"
         )
         rules.append(f"grade: each row's holds {holds}; mean over the distance of each second")
-    return columns, rules
+    return columns, rules, hints
 
 
 def _steps(time_s: Array) -> str:

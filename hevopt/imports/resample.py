@@ -19,7 +19,6 @@ Array = NDArray[np.float64]
 # Times nearer than this are one time; what converts ms or min to s leaves less.
 _SAME_TIME_S = 1e-6
 _NO_DISTANCE_M = 1e-9
-_ALTITUDE_SPACING_M = 20.0
 
 
 def one_hertz_times(duration_s: float) -> Array:
@@ -86,21 +85,3 @@ def mean_grades(time_s: Array, speed_mps: Array, grade: Array, at_s: Array) -> A
     moving = driven_m > _NO_DISTANCE_M
     held[:-1][moving] = climbed_m[moving] / driven_m[moving]
     return held
-
-
-def grades_from_altitude(distance_m: Array, altitude_m: Array) -> Array:
-    """(row,) grade of the road between points at least 20 m apart, so that an altimeter's steps are no walls.
-
-    Both arguments (row,), distance along the road; the climb between those points is kept.
-    """
-    points = [0]
-    for row, driven_m in enumerate(distance_m.tolist()):
-        if driven_m - distance_m[points[-1]] >= _ALTITUDE_SPACING_M:
-            points.append(row)
-    points[max(len(points) - 1, 1) :] = [len(distance_m) - 1]
-    sine = np.diff(altitude_m[points]) / np.maximum(
-        np.diff(distance_m[points]), _ALTITUDE_SPACING_M
-    )
-    sine = np.clip(sine, -0.99, 0.99)  # steeper than any road; the reader of cycles refuses it
-    rows = np.repeat(sine / np.sqrt(1 - sine**2), np.diff(points))
-    return np.append(rows, rows[-1:])

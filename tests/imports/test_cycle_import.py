@@ -290,7 +290,7 @@ def test_altitude_becomes_grade_only_where_it_is_named(tmp_path):
     result = imported(tmp_path, text, columns={"altitude": "altitude_m"})
     # 0.4 m in 10 m of road.
     assert result.cycle.grade[:-1] == pytest.approx(0.04 / np.sqrt(1 - 0.04**2), abs=1e-6)
-    assert any("at least 20 m apart" in text for text in result.rules)
+    assert any("through 100 m of road" in text for text in result.rules)
     assert ("grade", "24.0 m up, 0.0 m down") in summary(result)
 
 
