@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
+from hevopt.imports.matlab_cycles import CONVENTION, arranged, array_unit
 from hevopt.imports.measured_cells import LARGEST, LISTED, Cells
 from hevopt.imports.measured_names import cleaned
 from hevopt.imports.measured_rows import CELLS_MAX, ROWS_MAX, Table
@@ -41,9 +42,6 @@ _BYTE_ORDERS = {b"IM": "<", b"MI": ">"}
 _BROKEN = (
     ValueError, KeyError, IndexError, TypeError, OverflowError, StopIteration, struct.error, zlib.error,
 )  # fmt: skip
-# ADVISOR and tools after it: arrays of two columns, time in seconds and speed.
-_CYCLE_ARRAYS = {"cyc_mph": "mph", "cyc_kph": "km/h", "cyc_kmh": "km/h", "cyc_mps": "m/s"}
-
 # Name -> numbers of any type, or None for a variable that is no matrix of real numbers.
 Variables = dict[str, NDArray | None]
 
@@ -151,6 +149,7 @@ def _level_4(contents: bytes) -> Variables:
 
 
 def _matlab_columns(path: Path, variables: Variables) -> Table:
+    variables, arranging = arranged(path, variables)
     numeric = {n: v for n, v in variables.items() if v is not None and v.size > 1}
     if not numeric:
         raise DataError(
@@ -176,20 +175,12 @@ def _matlab_columns(path: Path, variables: Variables) -> Table:
         array = arrays[name]
         for i in range(array.shape[1]):
             names.append(cleaned(name) + (f"(:,{i + 1})" if array.shape[1] > 1 else ""))
-            units.append(_array_unit(name, array, i))
+            units.append(array_unit(name, array, i))
             columns.append(_cells(array[:, i]))
-    notes = ["MATLAB file, lines are row numbers"]
+    notes = ["MATLAB file, lines are row numbers", *arranging]
     if left_out:
         notes.append(f"left out, not of {rows} rows of numbers: {', '.join(left_out)}")
-    source = "MATLAB convention of cyc_mph"
-    return Table(names, units, columns, np.arange(1, rows + 1), notes, source)
-
-
-def _array_unit(name: str, array: NDArray, i: int) -> str:
-    speed = _CYCLE_ARRAYS.get(name.split(".")[-1].lower())
-    if speed is None or array.shape[1] != 2:
-        return ""
-    return ("s", speed)[i]
+    return Table(names, units, columns, np.arange(1, rows + 1), notes, CONVENTION)
 
 
 def _cells(values: NDArray) -> Cells:
