@@ -12,9 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
-from hevopt.files import printable
 from hevopt.imports.coastdown import Run
-from hevopt.imports.measured import Column, Measured, column_named, column_of, in_si, read_measured
+from hevopt.imports.coastdown_directions import Directions, Way, directions_in, signs
+from hevopt.imports.measured import (
+    Column,
+    Measured,
+    column_named,
+    column_of,
+    columns_found,
+    in_si,
+    read_measured,
+)
 
 Array = NDArray[np.float64]
 
@@ -25,7 +33,7 @@ _ALIASES = {
     "direction": {"direction", "dir", "heading", "way"},
 }  # fmt: skip
 _QUANTITIES = {"time": "time", "speed": "speed"}
-ROLES, ROLES_WITH_UNIT = tuple(_ALIASES), tuple(_QUANTITIES)
+ROLES, ROLES_WITH_UNIT = tuple(_ALIASES), (*_QUANTITIES, "direction")
 _SAMPLES_MIN = 10
 _FALL_MIN_MPS = 3.0
 _BLOCK_S = 3.0
@@ -59,7 +67,8 @@ def read_runs(
         found, said = _parts(path, columns, units, sheet)
         parts += found
         notes += [f"{path.name}: {note}" for note in said]
-    labels, said = _directions(parts, directions)
+    ways, places = [way for *_, way in parts], [place for _, _, place, _ in parts]
+    labels, said = signs(ways, places, directions, _SEPARATE)
     notes += said
     runs = [
         Run(str(k + 1), direction, time, speed, place)
@@ -72,37 +81,16 @@ def read_runs(
     return runs, notes
 
 
-def _parts(path: Path, columns: Mapping[str, str], units: Mapping[str, str], sheet: str | None):
+def _parts(
+    path: Path, columns: Mapping[str, str], units: Mapping[str, str], sheet: str | None
+) -> tuple[list[tuple[Array, Array, str, Way]], list[str]]:
+    """Time, speed, place and direction of every run of a file, and how it was read."""
     measured = read_measured(path, sheet=sheet)
-    values, words, notes = {}, [], list(measured.notes)
-    for role, aliases in _ALIASES.items():
-        named = columns.get(role)
-        column = (
-            column_named(measured, named)
-            if named
-            else column_of(measured, aliases, f"--column {role}=NAME")
-        )
-        if column is None and role in _QUANTITIES:
-            names = ", ".join(c.name for c in measured.columns)
-            raise DataError(
-                f"{measured.path}: no column of {role}; name it with --column {role}=NAME; found: {names}"
-            )
-        if column is None:
-            continue
-        if role in _QUANTITIES:
-            found = in_si(
-                measured, column, (_QUANTITIES[role],), f"--unit {role}=UNIT", units.get(role)
-            )
-            values[role], note = found.values, found.note
-        else:
-            values[role], note = column.values, f"column {column.name}"
-        if role == "direction" and column.words:
-            values[role], words = _coded(column)
-        notes.append(f"{role}: {note}")
-        _check_numbers(measured, role, values[role])
-    time = values["time"]
-    begins = np.zeros(max(len(time) - 1, 0), dtype=bool)
-    if "run" not in values:
+    values, ways, notes = _values(measured, columns, units)
+    time, begins = values["time"], np.zeros(max(len(values["time"]) - 1, 0), dtype=bool)
+    if "run" in values:
+        begins = np.diff(values["run"]) != 0
+    else:
         gaps = _gaps(time)
         begins = gaps | (np.diff(time) < 0)
         if gaps.any():
@@ -111,33 +99,54 @@ def _parts(path: Path, columns: Mapping[str, str], units: Mapping[str, str], she
             notes.append(
                 f"a gap in time begins a new run in line {', '.join(map(str, after[:_LISTED]))}{more}"
             )
-    for role in ("run", "direction"):
-        if role in values:
-            begins |= np.diff(values[role]) != 0
-    edges = [0, *(np.flatnonzero(begins) + 1), len(time)]
-    parts = [
-        (
-            time[a:b],
-            values["speed"][a:b],
-            f"{measured.path}, lines {measured.lines[a]} to {measured.lines[b - 1]}",
-            _way(values["direction"][a], words) if "direction" in values else None,
-        )
-        for a, b in pairwise(edges)
-    ]
+    if ways is not None:
+        begins |= ways.changes()
+    parts = []
+    for a, b in pairwise([0, *(np.flatnonzero(begins) + 1), len(time)]):
+        place = f"{measured.path}, lines {measured.lines[a]} to {measured.lines[b - 1]}"
+        way = ways.of_run(slice(a, b), place) if ways is not None else None
+        parts.append((time[a:b], values["speed"][a:b], place, way))
     return parts, notes
 
 
-def _coded(column: Column) -> tuple[Array, list[str]]:
-    """(row,) the number of each row's text, NaN for others, and the texts; capitals do not matter."""
-    codes, words = np.full(len(column.values), np.nan), {}
-    for text, rows in column.words.items():
-        word = words.setdefault(text.casefold(), (len(words), text))
-        codes[np.asarray(rows)] = word[0]
-    return codes, [text for _, text in words.values()]
+def _values(
+    measured: Measured, columns: Mapping[str, str], units: Mapping[str, str]
+) -> tuple[dict[str, Array], Directions | None, list[str]]:
+    """Values of each role by row, the directions where a column has them, and notes."""
+    values, ways, notes = {}, None, list(measured.notes)
+    for role in ROLES:
+        column = _column(measured, role, columns.get(role))
+        if column is None:
+            continue
+        if role in _QUANTITIES:
+            found = in_si(
+                measured, column, (_QUANTITIES[role],), f"--unit {role}=UNIT", units.get(role)
+            )
+            values[role], note = found.values, found.note
+        elif role == "direction":
+            ways = directions_in(measured, column, units.get(role))
+            values[role], note = ways.values, ways.note
+        else:
+            values[role], note = column.values, f"column {column.name}"
+        notes.append(f"{role}: {note}")
+        _check_numbers(measured, role, values[role])
+    if ways is None and "direction" in units:
+        raise DataError(
+            f"{measured.path}: --unit direction without a column of direction; name it with --column "
+            f"direction=NAME; {columns_found(measured)}"
+        )
+    return values, ways, notes
 
 
-def _way(value: float, words: list[str]) -> float | str:
-    return words[int(value)] if words else float(value)
+def _column(measured: Measured, role: str, named: str | None) -> Column | None:
+    if named:
+        return column_named(measured, named)
+    column = column_of(measured, _ALIASES[role], f"--column {role}=NAME")
+    if column is None and role in _QUANTITIES:
+        raise DataError(
+            f"{measured.path}: no column of {role}; name it with --column {role}=NAME; {columns_found(measured)}"
+        )
+    return column
 
 
 def _gaps(time: Array) -> NDArray[np.bool_]:
@@ -163,48 +172,6 @@ def _check_numbers(measured: Measured, role: str, values: Array) -> None:
             f"{measured.path}, line {measured.lines[k]}: {role} {fault} ({bad.sum()} such rows){allowed}; correct "
             "or delete the rows"
         )
-
-
-def _directions(parts: list, given: Sequence[int] | None) -> tuple[list[int], list[str]]:
-    """+1 and -1 of every run, and which is which where a column names them otherwise: +1 is the first met."""
-    raw = [direction for *_, direction in parts]
-    if given is not None:
-        if raw != [None] * len(parts):
-            raise DataError(
-                "the directions are in a column and in --directions; leave --directions out"
-            )
-        if len(given) != len(parts):
-            raise DataError(
-                f"--directions names {len(given)} runs, the files hold {len(parts)}: "
-                + "; ".join(place for _, _, place, _ in parts[:6])
-                + f"; {_SEPARATE}"
-            )
-        return list(given), []
-    if None in raw:
-        raise DataError(
-            f"no column of direction for the {len(parts)} run{'s' * (len(parts) > 1)} found; add one (1 and -1), "
-            "name it with --column direction=NAME, or give --directions +,-,+,- in the order of the runs; "
-            f"{_SEPARATE}"
-        )
-    spelled: dict[str, str] = {}
-    raw = [spelled.setdefault(d.casefold(), d) if isinstance(d, str) else d for d in raw]
-    kinds = list(dict.fromkeys(raw))
-    names = [printable(k) if isinstance(k, str) else f"{k:g}" for k in kinds]
-    if len({type(kind) for kind in kinds}) > 1:
-        raise DataError(
-            f"the files name directions by numbers and by texts ({', '.join(names[:5])}); write the same two for "
-            "both"
-        )
-    if len(kinds) != 2:
-        listed = ", ".join(names[:5])
-        raise DataError(
-            f"{len(kinds)} direction{'s' if len(kinds) > 1 else ''} found ({listed}); needed: runs in two opposite "
-            "directions, since slope and wind cancel between them; add runs the other way"
-        )
-    if set(kinds) == {1.0, -1.0}:
-        return [int(direction) for direction in raw], []
-    note = f"direction: {names[0]} counts as +1, {names[1]} as -1"
-    return [1 if direction == kinds[0] else -1 for direction in raw], [note]
 
 
 def _check_run(run: Run) -> None:
