@@ -18,6 +18,9 @@ from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
 
+# kg/s or W beyond which no component's file goes.
+_LARGEST = {"fuel": 1e3, "nox": 1e3, "loss": 1e6}
+
 
 @dataclass(frozen=True, slots=True)
 class EngineFacts:
@@ -68,7 +71,7 @@ def read_points(source: Source, what: str, facts: EngineFacts) -> Points | None:
         missing = np.isnan(value)
         powerless |= missing & np.isnan(candidate) & ~np.isnan(table.values[role])
         value = np.where(missing, candidate, value)
-    _check_values(table, what, value)
+    _check_values(table, what, value, torque)
     known = ~np.isnan(value)
     if not known.any():
         raise DataError(
@@ -94,7 +97,9 @@ def read_curve(source: Source, role: str, facts: EngineFacts, *, plain: bool) ->
     if table is None:
         return None
     measured = table.measured
-    torque = _torque_nm(table, role, facts)
+    torque, notes = _torque_nm(table, role, facts), table.notes
+    if role == "motoring":
+        torque, notes = _drag(table, torque)
     known = ~np.isnan(torque)
     speed, first = np.unique(table.values["speed"][known], return_index=True)
     torque = torque[known]
@@ -106,8 +111,25 @@ def read_curve(source: Source, role: str, facts: EngineFacts, *, plain: bool) ->
             f"{measured.path}: {role} torque has several values at "
             f"{speed[~same][0] * RPM_PER_RADPS:g} rpm; a curve has one torque at each speed"
         )
-    note = f"{role} curve from {measured.path.name}: {'; '.join(table.notes)}"
+    note = f"{role} curve from {measured.path.name}: {'; '.join(notes)}"
     return Curve(speed, torque[first], note, frozenset(table.kinds))
+
+
+def _drag(table: Table, torque_nm: Array) -> tuple[Array, tuple[str, ...]]:
+    """The torque of the unfired engine below 0, and the notes; DataError where some rows brake and others drive."""
+    turning = table.values["speed"] > 0
+    driving, braking = turning & (torque_nm > 0), turning & (torque_nm < 0)
+    fewer, many = (driving, braking) if driving.sum() <= braking.sum() else (braking, driving)
+    still = turning & (torque_nm == 0)
+    if fewer.any() or still.any():
+        what, rows = ("has the other sign", fewer) if fewer.any() else ("is 0", still)
+        raise DataError(
+            f"{table.measured.path}, {_places(table, rows)}: the motoring torque of the turning engine {what}; "
+            "give it below 0 in every row, or as drag above 0 in every row"
+        )
+    if many is driving:
+        return -torque_nm, (*table.notes, "given as drag, sign turned")
+    return torque_nm, table.notes
 
 
 def _torque_nm(table: Table, role: str, facts: EngineFacts) -> Array:
@@ -167,14 +189,26 @@ def _known(table: Table, value: float | None, what: str, key: str) -> float:
     return value
 
 
-def _check_values(table: Table, what: str, value: Array) -> None:
-    bad = (value < 0) | np.isinf(value) | (table.values["speed"] < 0)
-    if bad.any():
-        k = np.flatnonzero(bad)[0]
-        raise DataError(
-            f"{table.measured.path}, {runs(sorted(set(table.lines[bad].tolist())))}: {what} or speed below 0, or "
-            f"not finite (first: {what} {value[k]:.4g} in SI); correct the cells"
-        )
+def _check_values(table: Table, what: str, value: Array, torque_nm: Array) -> None:
+    """DataError, with lines, for what no bench measures."""
+    speed = table.values["speed"]
+    fired = (speed > 0) & (torque_nm > 0)
+    for bad, found in (
+        (speed < 0, "speed below 0"),
+        (value < 0, f"{what} below 0"),
+        (
+            ~(np.abs(value) <= _LARGEST[what]) & ~np.isnan(value),
+            f"{what} beyond any engine or machine",
+        ),
+        ((value == 0) & fired & (what == "fuel"), "fuel 0 at a torque above 0"),
+    ):
+        if bad.any():
+            k = np.flatnonzero(bad)[0]
+            raise DataError(
+                f"{table.measured.path}, {_places(table, bad)}: {found} (first: at "
+                f"{speed[k] * RPM_PER_RADPS:.4g} rpm and {torque_nm[k]:.4g} Nm, {what} {value[k]:.4g} in SI); "
+                "correct the cells; leave those that were not measured empty"
+            )
 
 
 def _left_out(table: Table, what: str, known: NDArray[np.bool_], powerless: NDArray[np.bool_]):
