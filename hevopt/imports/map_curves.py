@@ -4,7 +4,6 @@ Below the motoring curve the fuel is cut; between it and the lowest measured tor
 linear.
 """
 
-from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -14,15 +13,14 @@ from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.imports.map_grid import Axes, Grid, Lines, envelope_nm, on_axes, torque_axis
 from hevopt.imports.map_import import Request
+from hevopt.imports.map_limits import cell_at, encloses, near
 from hevopt.imports.map_points import Curve, EngineFacts, Points, read_curve
 from hevopt.units import RPM_PER_RADPS, TO_SI
 
 Array = NDArray[np.float64]
 
 _PA_PER_BAR = 1e5
-_SAMPLES = 21
 _MOTORING_POINTS = 21
-_ROUNDING = 1e-6
 
 
 def motoring_curve(
@@ -45,9 +43,6 @@ def motoring_curve(
     if curve is None and "full" in request.extra:
         curve = read_curve(request.extra["full"], "motoring", facts, plain=False)
     if curve is not None:
-        if (curve.torque_nm > 0).all():
-            note = f"{curve.note}; given as drag, sign turned"
-            return replace(curve, torque_nm=-curve.torque_nm, note=note)
         return curve
     unfired = (points.value == 0) & (points.torque_nm < 0)
     if len(np.unique(lines.line[unfired])) == len(lines.speed_radps):
@@ -103,7 +98,7 @@ def full_load(request: Request, lines: Lines, facts: EngineFacts) -> Curve:
 def check_idle(idle_rpm: float, full: Curve) -> None:
     """DataError unless the engine can idle below its full-load curve."""
     low, high = full.speed_radps[0] * RPM_PER_RADPS, full.speed_radps[-1] * RPM_PER_RADPS
-    if not low - 1e-6 * low <= idle_rpm < high:
+    if not low * (1 - 1e-9) <= idle_rpm < high:
         raise DataError(
             f"idle_rpm {idle_rpm:g} lies outside the full-load curve, {low:g} to {high:g} rpm: the engine could "
             "not idle; add points at idle speed, give a wider --full-load, or set another --set idle_rpm=VALUE"
@@ -127,8 +122,11 @@ def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> tuple[G
             _fill_down_to(row, axis, least)
     else:
         values = on_axes(_and_motoring(lines, motoring), speed, axis).values
-    grid = Grid(speed, axis, np.where(axis <= drag[:, None], 0.0, values))
-    return _up_to_full_load(grid, lines, full) if lines.regular else (grid, 0)
+    unfired = axis <= drag[:, None]
+    # At a speed without any measurement nothing is known, and the 0 of the unfired engine would pass for it.
+    measured = (~np.isnan(values) & ~unfired).any(axis=1, keepdims=True)
+    grid = Grid(speed, axis, np.where(unfired & measured, 0.0, np.where(measured, values, np.nan)))
+    return _up_to_full_load(grid, drag, lines, full) if lines.regular else (grid, 0)
 
 
 def _fill_down_to(row: Array, axis: Array, least: float) -> None:
@@ -139,24 +137,23 @@ def _fill_down_to(row: Array, axis: Array, least: float) -> None:
         row[gap] = np.interp(axis[gap], [least, axis[known[0]]], [0.0, row[known[0]]])
 
 
-def _up_to_full_load(grid: Grid, lines: Lines, full: Curve) -> tuple[Grid, int]:
+def _up_to_full_load(grid: Grid, drag_nm: Array, lines: Lines, full: Curve) -> tuple[Grid, int]:
     """The grid with corners of cells that the full-load curve cuts, each row continued linearly beyond its top.
 
     A rectangular cell needs them to be used up to the curve; beyond it the engine cannot go. Left out where the
     curve lies above the measured points, so that nothing is used that they do not enclose.
     """
     speed, torque, values = grid.speed_radps, grid.torque_nm, grid.values.copy()
-    envelope, continued = envelope_nm(lines), 0
+    continued = 0
     for i, row in enumerate(values):
-        near = np.linspace(speed[max(i - 1, 0)], speed[min(i + 1, len(speed) - 1)], _SAMPLES)
-        wanted = np.interp(near, full.speed_radps, full.torque_nm)
-        known = np.flatnonzero(~np.isnan(row))
-        if len(known) < 2 or (wanted > np.interp(near, *envelope) * (1 + _ROUNDING)).any():
+        wanted = np.interp(near(speed, i), full.speed_radps, full.torque_nm)
+        # The 0 at and below the drag is no measurement that a line could be drawn through.
+        known = np.flatnonzero(~np.isnan(row) & (torque > drag_nm[i]))
+        if len(known) < 2 or not encloses(lines, wanted, near(speed, i)):
             continue
         continued += 1
         j, k = known[-2:]
-        top = int(np.searchsorted(torque, wanted.max() * (1 - _ROUNDING)))
-        beyond = slice(k + 1, top + 1)
+        beyond = slice(k + 1, cell_at(torque, wanted.max()) + 1)
         slope = (row[k] - row[j]) / (torque[k] - torque[j])
         row[beyond] = np.maximum(row[k] + slope * (torque[beyond] - torque[k]), 0.0)
     return Grid(speed, torque, values), continued

@@ -1,6 +1,7 @@
 """An engine component from a measured map: fuel, and NOx, on a grid of speed and torque, with its curves."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from hevopt.datafile import checked
 from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.imports.map_curves import check_idle, flow_grid, full_load, motoring_curve, on_speeds
-from hevopt.imports.map_grid import Lines, axes_of, in_lines
+from hevopt.imports.map_grid import Lines, axes_of, in_lines, is_idle
 from hevopt.imports.map_import import (
     Imported,
     Request,
@@ -18,7 +19,8 @@ from hevopt.imports.map_import import (
     rpm_list,
     with_given,
 )
-from hevopt.imports.map_points import EngineFacts, read_points
+from hevopt.imports.map_limits import lowered
+from hevopt.imports.map_points import Curve, EngineFacts, read_points
 from hevopt.units import RPM_PER_RADPS, TO_SI
 
 _ENGINE_KEYS = (
@@ -31,53 +33,61 @@ def import_engine(request: Request) -> Imported:
     """An engine with a measured map; DataError where something is missing or wrong."""
     like = like_component(request.like, EngineFile)
     base, origins = _engine_base(request, like)
-    facts = _facts(base, request.given)
+    facts, idle_radps = _facts(base, request.given), base["idle_rpm"] / RPM_PER_RADPS
+    lines = _fuel(request, facts, idle_radps)
+    nox = _nox(request, facts, lines.points.rectangular, idle_radps)
+    axes = axes_of(lines)
+    motoring = motoring_curve(request, lines, like, base["displacement_cm3"], facts)
+    full = _full_load(request, lines, facts, idle_radps)
+    # The highest torque of a lattice is one of its torques, not a measurement of full load.
+    flows = [] if axes.lattice else [lines] if nox is None else [lines, nox]
+    full, notes = lowered(full, flows)
+    grid, continued = flow_grid(lines, axes, motoring, full)
+    notes = [*lines.points.notes, *lines.notes, axes.rule, motoring.note, full.note, *notes]
+    if continued:
+        notes.append(
+            f"cells cut by the full-load curve: at {continued} of {len(grid.speed_radps)} speeds corners beyond "
+            "it continue the row, so that the map reaches up to the curve there; the engine never goes beyond it"
+        )
+    maps = {
+        "speed_rpm": rpm_list(grid.speed_radps),
+        "torque_nm": grid.torque_nm.tolist(),
+        "motoring_torque_nm": on_speeds(motoring, grid.speed_radps).tolist(),
+        "fuel_gps": (grid.values * 1e3).tolist(),
+    }
+    used, of_nox = lines.points.roles | motoring.roles | full.roles, None
+    if nox is None:
+        notes.append("NOx: none given, so it is not known in any result")
+    else:
+        used |= nox.points.roles
+        notes += _nox_notes(request, nox, notes)
+        of_nox = flow_grid(nox, axes, motoring, full)[0], nox
+        maps["nox_gps"] = (of_nox[0].values * 1e3).tolist()
+    check_used(request, used)
+    limit = {"speed_rpm": rpm_list(full.speed_radps), "torque_nm": full.torque_nm.tolist()}
+    contents = base | {"full_load": limit, "fuel_map": maps}
+    file = checked(f"component from {request.source.path.name}", contents, EngineFile)
+    return Imported(contents, file, origins, tuple(notes), grid, lines, of_nox)
+
+
+def _fuel(request: Request, facts: EngineFacts, idle_radps: float) -> Lines:
     points = read_points(request.source, "fuel", facts)
     if points is None:
         raise DataError(
             f"{request.source.path.name}: no column of fuel, specific consumption or efficiency found; name it "
             "with --column fuel=NAME (or specific=, efficiency=)"
         )
-    idle_radps = base["idle_rpm"] / RPM_PER_RADPS
-    lines = in_lines(points, proportional=True, idle_radps=idle_radps)
-    axes = axes_of(lines)
-    motoring = motoring_curve(request, lines, like, base["displacement_cm3"], facts)
+    return in_lines(points, proportional=True, idle_radps=idle_radps)
+
+
+def _full_load(request: Request, lines: Lines, facts: EngineFacts, idle_radps: float) -> Curve:
+    """The curve, which starts at idle where it does so but for rounding."""
     full = full_load(request, lines, facts)
-    grid, continued = flow_grid(lines, axes, motoring, full)
-    notes = [*points.notes, *lines.notes, axes.rule, motoring.note, full.note]
-    if continued:
-        notes.append(
-            f"cells cut by the full-load curve: at {continued} of {len(grid.speed_radps)} speeds corners beyond "
-            "it continue the row, so that the map reaches up to the curve there; the engine never goes beyond it"
-        )
-    contents = base | {
-        "full_load": {
-            "speed_rpm": rpm_list(full.speed_radps),
-            "torque_nm": full.torque_nm.tolist(),
-        },
-        "fuel_map": {
-            "speed_rpm": rpm_list(grid.speed_radps),
-            "torque_nm": grid.torque_nm.tolist(),
-            "motoring_torque_nm": on_speeds(motoring, grid.speed_radps).tolist(),
-            "fuel_gps": (grid.values * 1e3).tolist(),
-        },
-    }
-    used = points.roles | motoring.roles | full.roles
-    nox = _nox(request, facts, points.rectangular, idle_radps)
-    if nox is None:
-        notes.append("NOx: none given, so it is not known in any result")
-    else:
-        used |= nox.points.roles
-        notes += [note for note in nox.points.notes if note.startswith("nox")]
-        nox_grid, _ = flow_grid(nox, axes, motoring, full)
-        contents["fuel_map"]["nox_gps"] = (nox_grid.values * 1e3).tolist()
-        less = int((np.isnan(nox_grid.values) & ~np.isnan(grid.values)).sum())
-        if less:
-            notes.append(f"NOx: not known at {less} cells that have fuel; the car cannot use them")
-    check_idle(base["idle_rpm"], full)
-    check_used(request, used)
-    file = checked(f"component from {request.source.path.name}", contents, EngineFile)
-    return Imported(contents, file, origins, tuple(notes), grid, lines)
+    speed = full.speed_radps
+    if is_idle(speed[0], idle_radps):
+        full = replace(full, speed_radps=np.concatenate([[idle_radps], speed[1:]]))
+    check_idle(idle_radps * RPM_PER_RADPS, full)
+    return full
 
 
 def _engine_base(
@@ -139,3 +149,10 @@ def _nox(request: Request, facts: EngineFacts, in_grid: bool, idle_radps: float)
             f"{source.path.name}: no column of NOx found; name it with --column nox=NAME"
         )
     return None if points is None else in_lines(points, proportional=True, idle_radps=idle_radps)
+
+
+def _nox_notes(request: Request, nox: Lines, said: list[str]) -> list[str]:
+    """How NOx was read; a table of its own is named, and what the fuel's table has said already is not repeated."""
+    source = request.extra.get("nox")
+    notes = [note for note in (*nox.points.notes, *nox.notes) if source or note not in said]
+    return [f"{source.path.name if source else 'NOx'}: {note}" for note in notes]

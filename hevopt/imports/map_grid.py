@@ -31,6 +31,8 @@ _SAME = 1e-6
 _FILLED = 0.9
 _STEPS = 60
 _TORQUE_STEPS = 80
+# A bench's or a program's rounding of idle speed, such as rad/s with two decimals.
+_IDLE_SHARE = 5e-4
 # A rectangle of points has two ways to cut it in triangles; this decides, where rounding would otherwise.
 _SHEAR = 1e-3
 _POINTS_MIN = 4
@@ -85,6 +87,7 @@ def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> 
         line, mean = _clusters(points.speed_radps, 0.0, _SAME)
         moved = np.zeros(len(line))
     mean = _tidy(mean * RPM_PER_RADPS) / RPM_PER_RADPS
+    mean = np.where(is_idle(mean, idle_radps), idle_radps, mean)
     notes = []
     if moved.max() > _SAME * mean.max():
         rpm = moved.max() * RPM_PER_RADPS
@@ -97,6 +100,11 @@ def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> 
     if repeated:
         notes.append(f"{repeated} points measured more than once, averaged")
     return Lines(merged, line, mean, regular or points.rectangular, tuple(notes))
+
+
+def is_idle(speed_radps: Array, idle_radps: float) -> NDArray[np.bool_]:
+    """Whether a speed is idle speed but for rounding."""
+    return np.abs(speed_radps - idle_radps) <= _IDLE_SHARE * idle_radps
 
 
 def _speed_lines(points: Points, idle_radps: float) -> tuple[NDArray[np.int64], Array, bool]:

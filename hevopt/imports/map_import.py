@@ -35,7 +35,8 @@ class Request:
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
     """A component. contents: of its file, also checked as `file`; origins: key path -> where it comes from;
-    notes: what was read, assumed and left out; grid and lines: the map, and the points behind it
+    notes: what was read, assumed and left out; grid and lines: the map of fuel or loss, and the points behind it
+    nox: an engine's map of NOx, on the same axes, and its points; None where it is not known
     """
 
     contents: Mapping[str, Any]
@@ -44,6 +45,7 @@ class Imported:
     notes: tuple[str, ...]
     grid: Grid
     lines: Lines
+    nox: tuple[Grid, Lines] | None = None
 
 
 def like_component(name: str | None, model: type[Model]) -> Model | None:

@@ -18,12 +18,10 @@ from hevopt.imports.map_import import (
     rpm_list,
     with_given,
 )
+from hevopt.imports.map_limits import cell_at, near
 from hevopt.imports.map_points import Curve, EngineFacts, read_curve, read_points
 from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
-
-_SAMPLES = 21
-_ROUNDING = 1e-6
 
 
 def import_machine(request: Request) -> Imported:
@@ -95,11 +93,9 @@ def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
     speed, torque = grid.speed_radps, grid.torque_nm
     values, known = grid.values.copy(), np.isfinite(grid.values)
     for i, row in enumerate(values):
-        near = np.linspace(speed[max(i - 1, 0)], speed[min(i + 1, len(speed) - 1)], _SAMPLES)
-        most = np.interp(near, limit.speed_radps, limit.torque_nm).max()
-        top = min(int(np.searchsorted(torque, most * (1 - _ROUNDING))), len(torque) - 1)
-        low = max(int(np.searchsorted(torque, -most * (1 - _ROUNDING), "right")) - 1, 0)
-        row[(torque > torque[top]) | (torque < torque[low])] = np.nan
+        most = np.interp(near(speed, i), limit.speed_radps, limit.torque_nm).max()
+        top, low = torque[cell_at(torque, most)], -(-torque[::-1])[cell_at(-torque[::-1], most)]
+        row[(torque > top) | (torque < low)] = np.nan
     gone = int((known & np.isnan(values)).sum())
     return Grid(speed, torque, values), [
         "full-load curve: torque_max_nm, power_max_w and speed_max_rpm are its largest torque, power and speed; "

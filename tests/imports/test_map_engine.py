@@ -1,0 +1,118 @@
+"""What `hevopt maps import` makes of an engine's points, against the formula that they were sampled from."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from map_bench import ENGINE, LIKE, RPM, SPEEDS, bench, car_with, component, write
+from numpy.testing import assert_allclose
+
+from hevopt import engine as engine_model
+from hevopt import load_architecture
+
+IMPORT = ("maps", "import", "b.csv", "--kind", "engine", *LIKE)
+CURVES = ("--full-load", "curves.csv", "--motoring", "curves.csv")
+SPEED = np.array(SPEEDS) * RPM
+FULL = engine_model.full_load_torque_nm(ENGINE, SPEED)
+DRAG = engine_model.drag_torque_nm(ENGINE, SPEED)
+
+
+def write_curves(share: float = 1.0, more_nm: float = 0.0) -> None:
+    write("curves.csv", "n [rpm],full load [Nm],drag [Nm]", SPEEDS, FULL * share + more_nm, DRAG)
+
+
+def imported_engine():
+    return load_architecture(car_with("engine", "b.toml", "A")).engine
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_nox_is_unknown_where_its_table_does_not_reach_and_right_where_it_does(hevopt, apart):
+    rpm, torque, fuel, nox = bench().T
+    reached = (rpm >= 1000) & (rpm <= 4500)
+    write_curves()
+    more = ()
+    if apart:
+        write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, fuel)
+        write("nox.csv", "n [rpm],T [Nm],NOx [g/h]", *(c[reached] for c in (rpm, torque, nox)))
+        more = ("--nox", "nox.csv")
+    else:
+        blank = np.where(reached, nox, np.nan)
+        write("b.csv", "n [rpm],T [Nm],fuel [g/h],NOx [g/h]", rpm, torque, fuel, blank)
+    seen = hevopt(*IMPORT, *CURVES, *more)
+    assert seen.status == 0, seen
+    engine = imported_engine()
+    speed, share = np.meshgrid(np.linspace(850, 5000, 167) * RPM, np.linspace(0, 1, 40))
+    load = share * engine_model.full_load_torque_nm(engine, speed)
+    found = engine_model.nox_kgps(engine, load, speed)
+    inside = (speed >= 1000 * RPM) & (speed <= 4500 * RPM)
+    assert np.isnan(found[~inside]).all() and not np.isnan(found[inside]).any()
+    assert not np.isnan(engine_model.fuel_kgps(engine, load, speed)).any()
+    truth = engine_model.nox_kgps(ENGINE, load, speed)
+    assert_allclose(found[inside], truth[inside], rtol=0, atol=0.03 * truth.max())
+
+
+def test_a_full_load_curve_a_hair_above_the_points_is_reached(hevopt):
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h],NOx [g/h]", *bench().T)
+    write_curves(1.0001, 0.01)
+    seen = hevopt(*IMPORT, *CURVES)
+    assert "full load: up to 0.039 Nm (0.01%, at 1500 rpm) above the highest measured" in seen.out
+    engine = imported_engine()
+    speed = np.linspace(850, 5000, 800) * RPM
+    truth = engine_model.full_load_torque_nm(ENGINE, speed)
+    assert_allclose(engine_model.covered_torque_nm(engine, speed), truth, rtol=2e-6)
+    assert (np.array(component("b.toml")["full_load"]["torque_nm"]) <= FULL.max() + 1e-3).all()
+
+
+def test_a_full_load_curve_well_above_the_points_is_no_reason_to_go_beyond_them(hevopt):
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    write_curves(np.where(SPEED > 3000 * RPM, 1.1, 1.01))
+    seen = hevopt(*IMPORT, *CURVES)
+    assert "full load: up to 2.9 Nm" in seen.out and "the map ends below the curve at" in seen.out
+    engine = imported_engine()
+    speed = np.linspace(850, 5000, 800) * RPM
+    truth = engine_model.full_load_torque_nm(ENGINE, speed)
+    covered = engine_model.covered_torque_nm(engine, speed)
+    assert (covered <= truth * (1 + 1e-6)).all()
+    assert_allclose(covered[speed < 2700 * RPM], truth[speed < 2700 * RPM], rtol=1e-4)
+
+
+def test_corners_of_a_grid_that_hold_0_are_no_fuel(hevopt):
+    rpm, torque, fuel, _ = bench().T
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, np.where(torque > 260, 0.0, fuel))
+    seen = hevopt(*IMPORT)
+    lines = np.flatnonzero(torque > 260) + 2
+    assert seen.status == 2 and f"lines {lines[0]}-" in seen.err, seen
+    assert "fuel 0 at a torque above 0" in seen.err and "not measured empty" in seen.err
+
+
+@pytest.mark.parametrize("digits", [1, 2, 3, 4])
+def test_curves_in_rounded_rad_per_s_start_at_idle(hevopt, digits):
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    write("curves.csv", "n [rad/s],full load [Nm],drag [Nm]", np.round(SPEED, digits), FULL, DRAG)
+    seen = hevopt(*IMPORT, *CURVES)
+    assert seen.status == 0, seen
+    assert component("b.toml")["full_load"]["speed_rpm"][0] == pytest.approx(850, rel=1e-9)
+
+
+def test_drag_above_0_is_turned_also_with_a_standstill_and_mixed_signs_are_named(hevopt):
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    write("drag.csv", "n [rpm],drag [Nm]", [0, *SPEEDS], np.abs([0, *DRAG]))
+    seen = hevopt(*IMPORT, "--motoring", "drag.csv")
+    assert seen.status == 0 and "given as drag, sign turned" in seen.out, seen
+    assert_allclose(engine_model.drag_torque_nm(imported_engine(), SPEED), DRAG, rtol=1e-6)
+    mixed = np.where(np.arange(len(SPEEDS)) == 4, 1, -1) * DRAG
+    write("drag.csv", "n [rpm],drag [Nm]", SPEEDS, mixed)
+    seen = hevopt(*IMPORT, "--motoring", "drag.csv")
+    assert seen.status == 2 and "line 6: the motoring torque" in seen.err, seen
+    assert "has the other sign" in seen.err
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [("-900,50,400", ["line 6", "speed below 0"]), ("900,50,1e20", ["line 6", "fuel beyond any"])],
+)
+def test_what_no_bench_measures_is_named_with_its_line(hevopt, row, said):
+    rows = ["n [rpm],T [Nm],fuel [g/h]", "800,0,400", "800,100,2000", "5000,0,3000", "5000,9,9000"]
+    Path("b.csv").write_text("\n".join([*rows, row]) + "\n")
+    seen = hevopt(*IMPORT)
+    assert seen.status == 2 and all(words in seen.err for words in said), seen
