@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from hevopt.engine_file import EngineFile
 from hevopt.imports.coastdown import RoadLoad, Run
+from hevopt.imports.map_envelope import Envelope, envelope_of
 from hevopt.imports.map_gaps import WIDE, lowest_fired_nm, widest_gap
 from hevopt.imports.map_import import Imported
-from hevopt.imports.map_report import Envelope, envelope_of
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
 if TYPE_CHECKING:

@@ -29,12 +29,16 @@ class Gap:
     reach: tuple[float, float]
 
 
+def fired(lines: Lines) -> NDArray[np.bool_]:
+    """(point,) all but those of an engine dragged without fuel."""
+    return (lines.points.value > 0) | (lines.points.torque_nm >= 0)
+
+
 def lowest_fired_nm(lines: Lines, speed_radps: Array) -> Array:
     """Lowest torque measured at each speed, points of the unfired engine left out."""
     points = lines.points
-    unfired = (points.value <= 0) & (points.torque_nm < 0)
-    fired = replace(points, torque_nm=np.where(unfired, np.inf, points.torque_nm))
-    speed, lowest = envelope_nm(replace(lines, points=fired), -1.0)
+    burning = replace(points, torque_nm=np.where(fired(lines), points.torque_nm, np.inf))
+    speed, lowest = envelope_nm(replace(lines, points=burning), -1.0)
     known = np.isfinite(lowest)
     return np.interp(speed_radps, speed[known], lowest[known])
 

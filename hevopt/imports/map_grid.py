@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError
 from hevopt.grid import interpolated
 from hevopt.imports.map_points import Points
+from hevopt.imports.measured_rows import runs
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -36,6 +37,9 @@ _IDLE_SHARE = 5e-4
 # A rectangle of points has two ways to cut it in triangles; this decides, where rounding would otherwise.
 _SHEAR = 1e-3
 _POINTS_MIN = 4
+# Two measurements of one point, share of their average, that a bench repeats.
+_REPEATS = 0.02
+_TINY = 1e-12
 _AXIS_MAX = 400
 
 
@@ -96,10 +100,8 @@ def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> 
     if proportional:
         before = np.where(points.speed_radps > 0, points.speed_radps, 1.0)
         value = np.where(moved > _SAME * before, value * mean[line] / before, value)
-    merged, line, repeated = _averaged(points, line, mean, value)
-    if repeated:
-        notes.append(f"{repeated} points measured more than once, averaged")
-    return Lines(merged, line, mean, regular or points.rectangular, tuple(notes))
+    merged, line, repeats = _averaged(points, line, mean, value)
+    return Lines(merged, line, mean, regular or points.rectangular, (*notes, *repeats))
 
 
 def is_idle(speed_radps: Array, idle_radps: float) -> NDArray[np.bool_]:
@@ -226,18 +228,37 @@ def _on_triangles(lines: Lines, speed_radps: Array, torque_nm: Array) -> Array:
 
 
 def _averaged(points: Points, line: NDArray[np.int64], mean: Array, value: Array):
-    """Points with one at each place, their lines, and how many places had several."""
+    """Points with one at each place, their lines, and what is to be said of places that had several."""
     of_torque, torque = _clusters(points.torque_nm, 0.0, _SAME)
     key = np.column_stack([line, of_torque])
     places, first, which, count = np.unique(
         key, axis=0, return_index=True, return_inverse=True, return_counts=True
     )
-    total = np.bincount(which.ravel(), value)
+    which = which.ravel()
+    average = np.bincount(which, value) / count
     kept = Points(
-        mean[places[:, 0]], torque[places[:, 1]], total / count, points.lines[first],
+        mean[places[:, 0]], torque[places[:, 1]], average, points.lines[first],
         points.rectangular, points.roles, points.notes,
     )  # fmt: skip
-    return kept, places[:, 0], int((count > 1).sum())
+    return kept, places[:, 0], _said_of_repeats(points, value, which, average, count)
+
+
+def _said_of_repeats(points: Points, value: Array, which: Array, average: Array, count: Array):
+    """How many places were measured more than once, and the lines of those that disagree."""
+    if not (count > 1).any():
+        return []
+    low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+    np.minimum.at(low, which, value)
+    np.maximum.at(high, which, value)
+    spread = (high - low) / np.maximum(average, _TINY)
+    said = [f"{(count > 1).sum()} points measured more than once, averaged"]
+    if (spread > _REPEATS).any():
+        lines = sorted(set(points.lines[spread[which] > _REPEATS].tolist()))
+        said.append(
+            f"WARNING: repeats differ by up to {spread.max():.0%} of their average, {runs(lines)}; correct or "
+            "remove the wrong one"
+        )
+    return said
 
 
 def _clusters(values: Array, apart: float, share: float) -> tuple[NDArray[np.int64], Array]:

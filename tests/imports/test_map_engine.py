@@ -40,6 +40,11 @@ def test_nox_is_unknown_where_its_table_does_not_reach_and_right_where_it_does(h
         write("b.csv", "n [rpm],T [Nm],fuel [g/h],NOx [g/h]", rpm, torque, fuel, blank)
     seen = hevopt(*IMPORT, *CURVES, *more)
     assert seen.status == 0, seen
+    assert "idle NOx (850 rpm, torque 0): WARNING: not known" in seen.out
+    lost = float(seen.out.split("WARNING: at ")[1].split("%")[0])
+    area = np.trapezoid(FULL, SPEED)
+    rest = np.trapezoid(FULL[1:-1], SPEED[1:-1])
+    assert lost == pytest.approx(100 * (1 - rest / area), abs=1)
     engine = imported_engine()
     speed, share = np.meshgrid(np.linspace(850, 5000, 167) * RPM, np.linspace(0, 1, 40))
     load = share * engine_model.full_load_torque_nm(engine, speed)
@@ -116,3 +121,48 @@ def test_what_no_bench_measures_is_named_with_its_line(hevopt, row, said):
     Path("b.csv").write_text("\n".join([*rows, row]) + "\n")
     seen = hevopt(*IMPORT)
     assert seen.status == 2 and all(words in seen.err for words in said), seen
+
+
+def test_nox_of_a_table_of_its_own_is_reported_like_fuel(hevopt):
+    rpm, torque, _, nox = bench(wander_rpm=4.0).T
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    rows = [f"{a:.2f};{b:.2f};{c:.6f}" for a, b, c in zip(rpm, torque, nox, strict=True) if b >= 20]
+    rows.append(f"{rpm[4]:.2f};{torque[4]:.2f};{nox[4] * 2:.6f}")
+    Path("nox.csv").write_text("\n".join(["n [rpm];T [Nm];NOx [g/h]", *rows]).replace(".", ","))
+    seen = hevopt(*IMPORT, "--nox", "nox.csv")
+    assert seen.status == 0, seen
+    for said in ("nox.csv: UTF-8, separated by semicolons", "nox.csv: decimal comma",
+                 "nox.csv: nox: NOx [g/h] in g/h", "nox.csv: 15 speed lines; points moved to them by up to",
+                 "nox.csv: 1 points measured more than once, averaged",
+                 f"nox.csv: WARNING: repeats differ by up to 67% of their average, lines 3, {len(rows) + 1}",
+                 "below the lowest measured torque (20 Nm), linear", "idle NOx (850 rpm, torque 0): "):  # fmt: skip
+        assert said in seen.out, seen.out
+    covered = float(seen.out.split("NOx: ")[-1].split("%")[0])
+    assert covered == pytest.approx(100 * (1 - 20 / FULL.mean()), abs=2)
+
+
+def test_points_of_the_dragged_engine_are_no_doubt_about_the_map(hevopt):
+    rpm, torque, fuel, _ = bench().T
+    columns = ([*rpm, *SPEEDS], [*torque, *DRAG], [*fuel, *np.zeros(len(SPEEDS))])
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *columns)
+    seen = hevopt(*IMPORT)
+    assert "motoring curve: highest torque without fuel at each speed" in seen.out
+    assert "WARNING" not in seen.out, seen.out
+
+
+def test_a_hole_is_said_to_be_filled_only_where_it_is(hevopt):
+    rpm, torque, fuel, _ = bench((0, *range(10, 271, 20)), False).T
+    hole = (rpm > 1600) & (rpm < 2900) & (torque > 60) & (torque < 190)
+    table = np.full((len(SPEEDS), 15), np.nan)
+    torques = sorted(set(torque))
+    for r, t, f, gone in zip(rpm, torque, fuel, hole, strict=True):
+        table[SPEEDS.index(r), torques.index(t)] = np.nan if gone else f
+    rows = [",".join([f"{s}", *("" if np.isnan(x) else f"{x:.6g}" for x in row)])
+            for s, row in zip(SPEEDS, table, strict=True)]  # fmt: skip
+    head = ",".join(["n [rpm] \\ T [Nm]", *(f"{t:g}" for t in torques)])
+    Path("b.csv").write_text("\n".join([head, *rows]) + "\n")
+    seen = hevopt(*IMPORT, "--unit", "fuel=g/h")
+    assert "a hole in the measurement, not filled: what a car asks for there" in seen.out, seen.out
+    # Holes amid the map are named before those at its edge.
+    at = float(seen.out.split("holes: ")[1].split(": ")[1].split(" rpm")[0])
+    assert 1600 < at < 2900

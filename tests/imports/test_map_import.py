@@ -538,7 +538,7 @@ def test_speeds_that_wander_are_lines_and_keep_their_points(hevopt):
     seen = hevopt("maps", "import", "b.csv", "--kind", "engine", *LIKE)
     assert "15 speed lines; points moved" in seen.out, seen
     off = float(seen.out.split("fuel differs by ")[1].split("%")[0])
-    assert off < 2 and "neighbours disagree" not in seen.out
+    assert off < 2 and "WARNING: more than" not in seen.out
 
 
 def test_impossible_fuel_and_points_above_full_load_are_warned_of(hevopt):
