@@ -119,6 +119,16 @@ def faults_of(contents: dict[str, Any], model: type[BaseModel], most: int) -> tu
     return len(found), [_fault(model, fault) for fault in found[:most]] + more
 
 
+def good_keys(contents: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:
+    """What of some contents has no fault by itself, for checks that go beyond the model."""
+    try:
+        model.model_validate(contents)
+    except ValidationError as error:
+        faulty = {fault["loc"][0] for fault in error.errors(include_url=False) if fault["loc"]}
+        return {key: value for key, value in contents.items() if key not in faulty}
+    return contents
+
+
 def _all_faults(
     model: type[BaseModel], table: dict[str, Any], at: tuple[str | int, ...]
 ) -> list[dict[str, Any]]:

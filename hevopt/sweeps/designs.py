@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 from math import ceil, floor, log2, prod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,20 +15,25 @@ from hevopt.errors import DataError
 from hevopt.files import printable, shown
 from hevopt.sweeps.jobs import NOX_WEIGHT
 from hevopt.sweeps.parameters import DESIGNS_MAX, Range, Scalar, Values
-from hevopt.sweeps.study_file import SampleFile, SweepStudy
+from hevopt.sweeps.study_file import SampleFile, SweepStudy, located_changes
 
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """A value for every parameter; `number` is its place among the designs of the study, from 0."""
+    """A value for every parameter as the study has it, and the study's folder.
+
+    number: its place among the designs of the study, from 0
+    """
 
     number: int
     values: Mapping[str, Scalar]
+    folder: Path
 
     @property
     def changes(self) -> dict[str, Scalar]:
-        """Key path -> value of what differs from the study's architecture."""
-        return {key: value for key, value in self.values.items() if key != NOX_WEIGHT}
+        """Key path -> value of what differs from the study's architecture, paths of components being absolute."""
+        changed = {key: value for key, value in self.values.items() if key != NOX_WEIGHT}
+        return located_changes(self.folder, changed)
 
     @property
     def nox_weight(self) -> float:
@@ -39,10 +45,12 @@ class Design:
 class Designs(Sequence[Design]):
     """Designs in order, each made when it is asked for: a million take some megabytes.
 
-    levels: per parameter, its values; codes: (design, parameter) which of them the design has
+    folder: of the study; levels: per parameter, its values
+    codes: (design, parameter) which of them the design has
     duplicates, excluded: how many designs were left out, as sampled before and by constraints
     """
 
+    folder: Path
     keys: tuple[str, ...]
     levels: tuple[tuple[Scalar, ...], ...]
     codes: NDArray[np.int32]
@@ -57,7 +65,7 @@ class Designs(Sequence[Design]):
             return [self[n] for n in range(*number.indices(len(self)))]
         row = self.codes[number].tolist()
         values = {k: of[c] for k, of, c in zip(self.keys, self.levels, row, strict=True)}
-        return Design(range(len(self))[number], values)
+        return Design(range(len(self))[number], values, self.folder)
 
 
 def designs_of(study: SweepStudy) -> Designs:
@@ -66,7 +74,7 @@ def designs_of(study: SweepStudy) -> Designs:
     Every combination comes in the order of the file, the last parameter's values changing fastest; keys that share
     their first part, such as `battery.`, are one table in the file and so stand together.
     """
-    keys = tuple(study.parameters)
+    keys, folder = tuple(study.parameters), study.source.parent
     if study.sample is None:
         levels, codes = _combinations(study)
     else:
@@ -75,8 +83,8 @@ def designs_of(study: SweepStudy) -> Designs:
     if study.sample is not None:
         codes = codes[np.sort(np.unique(codes, axis=0, return_index=True)[1])]
     duplicates, distinct = made - len(codes), len(codes)
-    codes = codes[_allowed(study, Designs(keys, levels, codes))]
-    designs = Designs(keys, levels, codes, duplicates, distinct - len(codes))
+    codes = codes[_allowed(study, Designs(folder, keys, levels, codes))]
+    designs = Designs(folder, keys, levels, codes, duplicates, distinct - len(codes))
     if not len(designs):
         raise DataError(
             f"{study.source}: the constraints exclude each of {distinct} designs; loosen one, or widen "

@@ -1,12 +1,11 @@
 """The parameters of a sweep: what values each takes, and whether the architecture has such keys and allows them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, create_model, model_validator
 
-from hevopt.architecture import load_architecture
 from hevopt.datafile import FileModel, checked
 from hevopt.errors import DataError
 from hevopt.files import printable, shown
@@ -23,6 +22,7 @@ _NOX_WEIGHT_MAX = 1e6
 _DEPTH_MAX = 8
 
 Scalar = bool | int | float | str
+Load = Callable[[Mapping[str, Any]], object]
 
 
 def _kind(value: object) -> Kind | None:
@@ -145,8 +145,11 @@ def kind_of(values: Values) -> Kind:
     return "number" if isinstance(values, Range) else _kind(values[0])
 
 
-def parameter_faults(architecture: str, parameters: Mapping[str, Values]) -> Iterator[str]:
-    """What is wrong with single values: of numbers, the ends are tried; of texts, every one."""
+def parameter_faults(load: Load, parameters: Mapping[str, Values]) -> Iterator[str]:
+    """What is wrong with single values: of numbers, the ends are tried; of texts, every one.
+
+    load: makes the car with some changes, or raises DataError
+    """
     tried = {key: _telling(values) for key, values in parameters.items()}
     cars = {key: values for key, values in tried.items() if key != NOX_WEIGHT}
     for weight in tried.get(NOX_WEIGHT, ()):
@@ -158,7 +161,7 @@ def parameter_faults(architecture: str, parameters: Mapping[str, Values]) -> Ite
     for key, values in cars.items():
         seen: set[str | None] = {None}
         for value in values:
-            fault = _value_fault(architecture, key, value, cars)
+            fault = _value_fault(load, key, value, cars)
             if fault not in seen:
                 seen.add(fault)
                 yield f"parameters.{printable(key)} = {shown(value)}: {fault}"
@@ -175,24 +178,24 @@ def _telling(values: Values) -> list[Scalar]:
 
 
 def _value_fault(
-    architecture: str, key: str, value: Scalar, cars: Mapping[str, Sequence[Scalar]]
+    load: Load, key: str, value: Scalar, cars: Mapping[str, Sequence[Scalar]]
 ) -> str | None:
     """Why a value is not allowed, neither alone nor together with a value of another parameter."""
-    alone = _fault_of(architecture, {key: value})
+    alone = _fault_of(load, {key: value})
     if alone is None:
         return None
     others = {other: values for other, values in cars.items() if other != key}
     together = [{other: v} for other, values in others.items() for v in values]
     together += [{other: values[end] for other, values in others.items()} for end in (0, -1)]
     for changes in together:
-        if _fault_of(architecture, {**changes, key: value}) is None:
+        if _fault_of(load, {**changes, key: value}) is None:
             return None
     return alone
 
 
-def _fault_of(architecture: str, changes: Mapping[str, Any]) -> str | None:
+def _fault_of(load: Load, changes: Mapping[str, Any]) -> str | None:
     try:
-        load_architecture(architecture, changes)
+        load(changes)
     except DataError as error:
         return " ".join(str(error).split())
     return None

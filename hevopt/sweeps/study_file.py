@@ -13,9 +13,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from hevopt.architecture import Architecture, load_architecture
+from hevopt.architecture import COMPONENTS, Architecture, load_architecture
 from hevopt.cycle import load_cycle
-from hevopt.datafile import FileModel, checked, read_contents
+from hevopt.datafile import FileModel, faults_of, good_keys, read_contents
 from hevopt.errors import DataError, unknown_name
 from hevopt.files import find, is_path, printable, shown
 from hevopt.strategies import STRATEGIES, fitting
@@ -32,7 +32,7 @@ from hevopt.sweeps.parameters import (
 )
 
 _PARAMETERS_MAX = 32
-_FAULTS_LISTED = 20
+_FAULTS_LISTED, _MODEL_FAULTS = 20, 200
 # The keys of the whole file that may follow a table by mistake, and so fall into it.
 _OF_THE_FILE = ("architecture", "cycles", "strategies", "allow_shortfall", "constraints")
 _Names = Annotated[list[str], Field(min_length=1, max_length=1000)]
@@ -61,7 +61,7 @@ class SweepStudy:
     """What to sweep.
 
     source: the study file; architecture, cycles: names of shipped files, or absolute paths
-    parameters: key path of the architecture, or `nox_weight`, -> its values, in the order of the file
+    parameters: key path of the architecture, or `nox_weight`, -> its values, in order and as written
     sample: None for every combination
     """
 
@@ -76,34 +76,46 @@ class SweepStudy:
 
 
 def read_study(path: str | Path) -> SweepStudy:
-    """The study of a file; DataError with every fault and its place."""
-    path = Path(path)
+    """The study of a file; DataError with its faults, each with its place."""
+    study, faults = study_and_faults(Path(path))
+    _raise(Path(path), faults)
+    return study
+
+
+def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
+    """The study of a file, None where it has faults, and every fault, those beside wrong keys as well."""
     contents = read_contents(path)
-    faults = list(_misplaced(contents))
-    if contents.get("parameters", {}) == {}:
-        faults.append(
-            "parameters: nothing to vary; add the table [parameters] with a line such as "
-            "machine.power_max_w = [15e3, 18e3]"
-        )
-    if isinstance(contents.get("parameters"), dict):
-        given = list(flattened(contents["parameters"]))
-        contents["parameters"] = dict(given)
-        faults += _twice("parameters", [key for key, _ in given])
-    _raise(path, faults)
-    data = checked(str(path), contents, StudyFile)
-    parameters = _parameters(data, faults)
-    architecture, car = _car(path.parent, data.architecture, faults)
-    cycles = _cycles(path.parent, data.cycles, faults)
+    faults = _without_misplaced(contents)
+    faults += _with_flat_parameters(contents)
+    faults += faults_of(contents, StudyFile, _MODEL_FAULTS)[1]
+    good, folder = good_keys(contents, StudyFile), path.parent
+    parameters = _parameters(good.get("parameters", {}), "sample" in contents, faults)
+    architecture, car = _car(folder, good.get("architecture"), faults)
+    cycles = _cycles(folder, good.get("cycles", ()), faults)
+    faults += _strategy_faults(good.get("strategies", ()), car)
     if car is not None:
-        faults += _strategy_faults(data.strategies, car)
-        faults += parameter_faults(architecture, parameters)
-    complete = len(parameters) == len(data.parameters)
-    constraints = _constraints(data.constraints, parameters, faults) if complete else ()
-    _raise(path, faults)
+        load = lambda changes: load_architecture(architecture, located_changes(folder, changes))  # noqa: E731
+        faults += parameter_faults(load, parameters)
+    constraints: tuple[Constraint, ...] = ()
+    if parameters and len(parameters) == len(contents["parameters"]):
+        constraints = _constraints(good.get("constraints", ()), parameters, faults)
+    if faults:
+        return None, list(dict.fromkeys(faults))
+    data = StudyFile.model_validate(contents)
     return SweepStudy(
         path, architecture, cycles, tuple(data.strategies), data.allow_shortfall,
         parameters, data.sample, constraints,
-    )  # fmt: skip
+    ), []  # fmt: skip
+
+
+def located_changes(folder: Path, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Key path -> value with the paths of components taken from the folder of the study."""
+    return {
+        key: str((folder / value).absolute())
+        if key in COMPONENTS and isinstance(value, str) and is_path(value, ".toml")
+        else value
+        for key, value in changes.items()
+    }
 
 
 def _raise(path: Path, faults: Sequence[str]) -> None:
@@ -115,12 +127,33 @@ def _raise(path: Path, faults: Sequence[str]) -> None:
         raise DataError(f"{path}: {len(faults)} faults\n  " + "\n  ".join(listed))
 
 
-def _misplaced(contents: Mapping[str, Any]) -> Iterator[str]:
+def _without_misplaced(contents: dict[str, Any]) -> list[str]:
+    """Take keys of the whole file out of the tables that they fell into; a fault for each."""
+    faults = []
     for table in ("sample", "parameters"):
         inner = contents.get(table)
-        for key in _OF_THE_FILE:
-            if isinstance(inner, dict) and key in inner:
-                yield f"{table}.{key}: {key} is a key of the whole file; write it above the first [table]"
+        fallen = [key for key in _OF_THE_FILE if isinstance(inner, dict) and key in inner]
+        for key in fallen:
+            faults.append(
+                f"{table}.{key}: {key} is a key of the whole file; write it above the first [table]"
+            )
+            contents.setdefault(key, inner.pop(key))
+    return faults
+
+
+def _with_flat_parameters(contents: dict[str, Any]) -> list[str]:
+    """Make the parameters key paths and their values; the faults in that."""
+    tables = contents.setdefault("parameters", {})
+    if not isinstance(tables, dict):
+        return []
+    given = list(flattened(tables))
+    contents["parameters"] = dict(given)
+    if given:
+        return _twice("parameters", [key for key, _ in given])
+    return [
+        "parameters: nothing to vary; add the table [parameters] with a line such as "
+        "machine.power_max_w = [15e3, 18e3]"
+    ]
 
 
 def _twice(place: str, names: Sequence[str]) -> list[str]:
@@ -128,8 +161,10 @@ def _twice(place: str, names: Sequence[str]) -> list[str]:
     return [f"{place}: {shown(name)} is given twice; give it once" for name in twice]
 
 
-def _car(folder: Path, name: str, faults: list[str]) -> tuple[str, Architecture | None]:
-    """The architecture's name or absolute path, and the car before any change."""
+def _car(folder: Path, name: str | None, faults: list[str]) -> tuple[str, Architecture | None]:
+    """The architecture's name or absolute path, and the car before any change, None where it has faults."""
+    if name is None:
+        return "", None
     try:
         located = _located("architectures", name, ".toml", folder)
         return located, load_architecture(located)
@@ -140,14 +175,21 @@ def _car(folder: Path, name: str, faults: list[str]) -> tuple[str, Architecture 
 
 def _cycles(folder: Path, names: Sequence[str], faults: list[str]) -> tuple[str, ...]:
     """The cycles' names or absolute paths."""
-    located, read = [], []
+    located, by_name = [], {}
     for name in names:
         try:
             located.append(_located("cycles", name, ".csv", folder))
-            read.append(load_cycle(located[-1]).name)
+            by_name.setdefault(load_cycle(located[-1]).name, {})[located[-1]] = name
         except DataError as error:
             faults.append(f"cycles: {error}")
-    faults += _twice("cycles", read)
+    faults += _twice("cycles", names)
+    for name, files in by_name.items():
+        if len(files) > 1:
+            listed = ", ".join(printable(given) for given in files.values())
+            faults.append(
+                f"cycles: {len(files)} files have the name {shown(name)}: {listed}; results are told apart by "
+                "it: rename a file, or leave one out"
+            )
     return tuple(located)
 
 
@@ -157,8 +199,9 @@ def _located(kind: str, name: str, suffix: str, folder: Path) -> str:
     return str(find(kind, name, suffix, beside=folder).absolute())
 
 
-def _strategy_faults(names: Sequence[str], car: Architecture) -> Iterator[str]:
-    known = [*fitting(car.functions, every=True), BOUND]
+def _strategy_faults(names: Sequence[str], car: Architecture | None) -> Iterator[str]:
+    """What is wrong with the strategies; of a car that has faults itself, any may fit."""
+    known = [*(fitting(car.functions, every=True) if car else STRATEGIES), BOUND]
     for name in names:
         if name in STRATEGIES and name not in known:
             yield f"strategies: {name} does not fit {car.name}; allowed: {', '.join(known)}"
@@ -168,15 +211,15 @@ def _strategy_faults(names: Sequence[str], car: Architecture) -> Iterator[str]:
     yield from _twice("strategies", names)
 
 
-def _parameters(data: StudyFile, faults: list[str]) -> dict[str, Values]:
+def _parameters(given: Mapping[str, Any], sampled: bool, faults: list[str]) -> dict[str, Values]:
     parameters = {}
-    for key, given in data.parameters.items():
+    for key, value in given.items():
         try:
-            values = parameters[key] = values_of(key, given)
+            values = parameters[key] = values_of(key, value)
         except DataError as error:
             faults.append(str(error).replace("\n  ", "; "))
             continue
-        if data.sample is None and isinstance(values, Range) and values.count is None:
+        if not sampled and isinstance(values, Range) and values.count is None:
             faults.append(
                 f"parameters.{printable(key)}: count is missing; say how many values to take, or add the "
                 "table [sample]"

@@ -4,6 +4,8 @@ import pytest
 
 from hevopt.errors import DataError
 from hevopt.files import shipped_folder
+from hevopt.sweeps.designs import cars_of, designs_of
+from hevopt.sweeps.jobs import jobs_of
 from hevopt.sweeps.parameters import Range
 from hevopt.sweeps.study_file import read_study
 
@@ -181,10 +183,48 @@ def test_strategies_must_fit_the_functions_of_the_architecture(fault, study):
     assert study(text.format('"baseline", "bound"')).strategies == ("baseline", "bound")
 
 
-def test_one_cycle_under_two_names_is_given_twice(fault, tmp_path):
-    (tmp_path / "nedc.csv").write_text((shipped_folder("cycles") / "nedc.csv").read_text())
-    text = HEAD.replace('["nedc"]', '["nedc", "./nedc.csv"]') + "[parameters]\nnox_weight = [0]"
-    assert "cycles: 'nedc' is given twice" in fault(text)
+def test_two_cycles_of_one_name_are_refused_with_what_to_do(fault, tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "nedc.csv").write_bytes(
+            (shipped_folder("cycles") / "nedc.csv").read_bytes()
+        )
+    for names in ('"nedc", "a/nedc.csv"', '"a/nedc.csv", "b/nedc.csv"'):
+        text = HEAD.replace('"nedc"', names) + "[parameters]\nnox_weight = [0]"
+        listed = names.replace('"', "")
+        message = fault(text)
+        assert f"cycles: 2 files have the name 'nedc': {listed};" in message
+        assert "rename a file, or leave one out" in message
+    text = HEAD.replace('"nedc"', '"nedc", "nedc"') + "[parameters]\nnox_weight = [0]"
+    assert "cycles: 'nedc' is given twice; give it once" in fault(text)
+
+
+def test_components_are_relative_to_the_study_and_shown_as_written(
+    study, fault, tmp_path, monkeypatch
+):
+    monkeypatch.chdir("/")
+    engine = shipped_folder("architectures") / "components" / "engine_diesel_1600.toml"
+    (tmp_path / "my_engine.toml").write_bytes(engine.read_bytes())
+    text = (
+        HEAD
+        + """constraints = ["engine == './my_engine.toml'"]
+[parameters]
+engine = ["./my_engine.toml", "engine_diesel_1600"]
+"""
+    )
+    designs = designs_of(study(text))
+    (design,) = designs
+    assert design.values == {"engine": "./my_engine.toml"}
+    assert design.changes == {"engine": str(tmp_path / "my_engine.toml")}
+    (car,) = cars_of(study(text), designs)
+    assert tmp_path / "my_engine.toml" in car.files
+    (jobs, _), (shipped_jobs, _) = (
+        next(jobs_of("C2", ["nedc"], ["bound"], [(c, [(0, 0.0)])]))
+        for c in (design.changes, {"engine": "engine_diesel_1600"})
+    )
+    assert jobs.inputs == shipped_jobs.inputs
+    message = fault(text.replace('my_engine.toml"', 'my_engin.toml"'))
+    assert "parameters.engine = './my_engin.toml'" in message and "does not exist" in message
 
 
 def test_a_value_that_is_allowed_only_together_with_another_parameter_is_no_fault(study, fault):
