@@ -167,10 +167,16 @@ def _cuts_nox(strategy: str) -> bool:
 def _cars(
     wanted: Sequence[Architecture | str | Path], changes: Mapping[str, Any] | None
 ) -> list[Architecture]:
-    """The architectures, no two of one name: rows are told apart by it."""
+    """The architectures, no two of one name."""
     cars = [a if isinstance(a, Architecture) else load_architecture(a, changes) for a in wanted]
     if not cars:
         raise DataError("no architecture given; name at least one, or leave the list out for all")
+    check_one_of_each_name(cars)
+    return cars
+
+
+def check_one_of_each_name(cars: Iterable[Architecture]) -> None:
+    """DataError where two cars have one name: rows are told apart by it."""
     by_name: dict[str, Architecture] = {}
     for car in cars:
         if car.name in by_name:
@@ -179,7 +185,6 @@ def _cars(
                 f"{car.source}; leave one out, or change its name"
             )
         by_name[car.name] = car
-    return cars
 
 
 def _check_strategies(names: Sequence[str]) -> None:

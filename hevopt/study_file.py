@@ -15,12 +15,13 @@ own. The cost of a shift is for cars whose gear is free.
 
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from hevopt.architecture import COMPONENTS, Architecture, load_architecture
 from hevopt.datafile import FileModel, checked, read_contents
@@ -29,6 +30,7 @@ from hevopt.file_fields import AuxiliaryPower, Mass, ShiftFuel, Soc, StartFuel
 from hevopt.files import is_path, printable, shipped_names, shown
 
 NEUTRAL = "neutral"
+NAMES_MAX = 1000
 # Setting -> the key that it stands for.
 KEYS = {
     "mass_kg": "car.mass_kg",
@@ -55,12 +57,24 @@ def _soc_end(value: Any) -> Any:
     return value
 
 
+def _each_once(names: list[str]) -> list[str]:
+    if not names:
+        raise ValueError("name at least one, or leave it out for the usual ones")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(f"{shown(twice[0])} is given twice; give it once")
+    return names
+
+
+_Names = Annotated[list[str], Field(max_length=NAMES_MAX), AfterValidator(_each_once)]
+
+
 class CompareFile(FileModel):
     """What a comparison is made of; None for what is left to the default."""
 
     cycle: str | None = None
-    architectures: list[str] | None = None
-    strategies: list[str] | None = None
+    architectures: _Names | None = None
+    strategies: _Names | None = None
     nox_weight: Annotated[float, Field(ge=0, le=1e6)] | None = None
     allow_shortfall: bool | None = None
     free_gear: bool | None = None
@@ -252,5 +266,8 @@ def _flat(table: Mapping[str, Any], at: str = "") -> dict[str, Any]:
 
 
 def beside_study(path: Path, name: str, suffix: str) -> str:
-    """A name as it stands; a path in a study file, from where that lies."""
-    return str(path.parent / name) if is_path(name, suffix) else name
+    """A name as it stands; a path in a study file, from where that lies and still a path."""
+    if not is_path(name, suffix):
+        return name
+    located = str(path.parent / name)
+    return located if is_path(located, suffix) else f"./{located}"

@@ -49,6 +49,8 @@ LAYERS = [
     ["reproduction"],
     ["report"],
     ["architecture_new", "sweeps"],
+    ["file_checks"],
+    ["study_checks"],
     ["validation"],
     ["pages"],
     ["commands"],

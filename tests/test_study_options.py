@@ -295,7 +295,7 @@ def test_a_wrong_option_is_one_message(hevopt, words, said):
     ("text", "said"),
     [
         ("cycl = 'nedc'\n", "unknown key cycl; close matches: cycle"),
-        ("architectures = []\n", "no architecture given"),
+        ("architectures = []\n", "architectures = []: name at least one"),
         ("soc_start = 2\nmass_kg = 'x'\n", "2 faults"),
         ("coupling = 1\n", "an architecture; give the file with --architectures"),
         ("parameters = {}\n", "give the file to hevopt sweep"),
@@ -376,3 +376,9 @@ def test_notes_say_what_an_asked_end_charge_means_and_when_there_is_no_reference
 def test_a_wrong_setting_from_python_is_a_data_error():
     with pytest.raises(DataError, match="allowed: 50 to 100000"):
         settings_of("here", {"mass_kg": 1})
+
+
+def test_a_path_without_suffix_stays_a_path_beside_a_study_in_the_working_folder(hevopt):
+    Path("nedc").write_text("time_s,speed_kmh\n0,0\n10,36\n20,0\n")
+    Path("study.toml").write_text('cycle = "./nedc"\narchitectures = ["A"]\nsoc_end = "neutral"\n')
+    assert read_study(Path("study.toml")).given["cycle"] == "./nedc"

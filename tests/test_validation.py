@@ -246,3 +246,67 @@ def test_loading_a_cycle_and_validating_it_read_alike():
     for path in shipped_folder("cycles").glob("*.csv"):
         assert faults_in(path) == []
         assert cycle_of(path, path.read_text()).duration_s == load_cycle(path).duration_s
+
+
+def test_a_study_that_names_itself_or_another_is_told_that_it_is_no_architecture(folder):
+    text = 'cycle = "nedc"\narchitectures = ["./{}.toml"]\nstrategies = ["baseline"]\n'
+    for name, other in (("alone", "alone"), ("one", "two"), ("two", "one")):
+        Path(f"{name}.toml").write_text(text.format(other))
+    for name, other in (("alone", "alone"), ("one", "two")):
+        (fault,) = validate(f"{name}.toml").faults
+        assert f"./{other}.toml is no architecture but of the kind study file of compare" in fault
+    Path("c.toml").write_text('cycle = "./alone.toml"\narchitectures = ["A"]\n')
+    (fault,) = validate("c.toml").faults
+    assert "cycle: ./alone.toml is no cycle but of the kind study file of compare" in fault
+
+
+def test_what_is_named_twice_is_refused_as_compare_does_and_read_once(folder, monkeypatch, capsys):
+    Path("study.toml").write_text(
+        'architectures = ["A", "A"]\nstrategies = ["baseline", "baseline"]\n'
+    )
+    found = validate("study.toml")
+    assert found.count == 2
+    for key, name in (("architectures", "A"), ("strategies", "baseline")):
+        assert any(
+            f"{key} = [" in f and f"'{name}' is given twice; give it once" in f
+            for f in found.faults
+        )
+    assert call(monkeypatch, capsys, "compare", "study.toml").status == 2
+    copy = (SHIPPED / "A.toml").read_text()
+    Path("copy.toml").write_text(copy.replace('"C2"', '"A"'))
+    Path("study.toml").write_text('architectures = ["A", "./copy.toml"]\n')
+    (fault,) = validate("study.toml").faults
+    assert "architecture A is given twice" in fault
+    Path("study.toml").write_text(f"architectures = {['A'] * 5000}\n")
+    (fault,) = validate("study.toml").faults
+    assert "allowed: up to 1000 entries" in fault
+    Path("study.toml").write_text("architectures = []\nstrategies = []\n")
+    assert validate("study.toml").count == 2
+
+
+def test_every_fault_of_a_sweep_is_listed_beside_unknown_keys(folder):
+    Path("sweep.toml").write_text(
+        'architecture = "C99"\ncycles = ["nedcc"]\nstrategies = ["bnd"]\nfoo = 1\n[parameters]\n'
+        "machine.power_max_w = []\nnox_weight = 3\n"
+    )
+    faults = validate("sweep.toml").faults
+    for words in (
+        "unknown key foo",
+        "'C99' not found",
+        "'nedcc' not found",
+        "machine.power_max_w = []",
+        "nox_weight = 3",
+        "strategy 'bnd' not found",
+    ):
+        assert sum(words in fault for fault in faults) == 1, (words, faults)
+    text = Path("sweep.toml").read_text().replace("C99", "C2")
+    Path("sweep.toml").write_text(text + "constraints = [3]\n[sample]\nmethod = 'x'\n")
+    faults = validate("sweep.toml").faults
+    for words in (
+        "strategy 'bnd' not found",
+        "constraints is a key of the whole file",
+        "constraints.0 = 3: text in quotes",
+        "sample.count is missing",
+        "sample.method = 'x'",
+    ):
+        assert sum(words in fault for fault in faults) == 1, (words, faults)

@@ -1,0 +1,149 @@
+"""Files of every kind but studies checked in full: architectures and the components behind them, cycles.
+
+What a TOML file is, is told by its keys: the kind that knows most of them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hevopt.architecture import COMPONENTS, component_contents, load_architecture
+from hevopt.cycle import faults_in, load_cycle
+from hevopt.datafile import FileModel, faults_of, read_contents
+from hevopt.errors import DataError, HevoptError
+from hevopt.file_schema import MODELS
+from hevopt.files import read_text
+from hevopt.study_file import CompareFile
+from hevopt.sweeps.study_file import StudyFile
+from hevopt.units import KMH_PER_MPS
+
+ARCHITECTURE, CYCLE = "architecture", "cycle"
+COMPARE, SWEEP = "study file of compare", "study file of sweep"
+_KINDS: dict[str, type[FileModel]] = {**MODELS, COMPARE: CompareFile, SWEEP: StudyFile}
+_LINES_LISTED = 20
+_MEGABYTES_MAX = 50
+_KEYS_LISTED = 200
+# A shipped car in which a component is tried out.
+_TRIED_IN = "C2"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a file is, in words, and its faults, each with file, key path or line, value and what is allowed.
+
+    count: how many there are; beyond some tens of lines of a cycle, `faults` ends with how many are left out
+    """
+
+    path: Path
+    kind: str
+    about: str
+    faults: list[str]
+    count: int
+
+
+def finding(path: Path, kind: str, about: str, faults: list[str]) -> Finding:
+    """A finding whose faults are all listed."""
+    return Finding(path, kind, about, faults, len(faults))
+
+
+def kind_and_contents(path: Path) -> tuple[str, dict[str, Any]]:
+    """The kind of a file, and its keys and values unless it is a cycle."""
+    if _is_cycle(path):
+        return CYCLE, {}
+    contents = read_contents(path)
+    return _kind_of(path, contents), contents
+
+
+def _kind_of(path: Path, contents: dict[str, Any]) -> str:
+    """The kind of file that knows most of the keys; of several, the one with most of what it needs."""
+
+    def fit(kind: str) -> tuple[int, float]:
+        fields = _KINDS[kind].model_fields
+        needed = [name for name, field in fields.items() if field.is_required()]
+        return sum(key in fields for key in contents), -sum(key not in contents for key in needed)
+
+    best = max(_KINDS, key=fit)
+    equal = [kind for kind in _KINDS if fit(kind) == fit(best)]
+    if fit(best)[0] == 0 or len(equal) > 1 or set(contents) == {"name"}:
+        raise DataError(
+            f"{path}: its keys are those of no known file; expected: {', '.join(_KINDS)} in TOML, or a cycle "
+            "in CSV"
+        )
+    return best
+
+
+def _is_cycle(path: Path) -> bool:
+    if path.suffix.lower() in (".csv", ".toml"):
+        return path.suffix.lower() == ".csv"
+    lines = (line.strip() for line in read_text(path, _MEGABYTES_MAX).splitlines())
+    header = next((line for line in lines if line and not line.startswith("#")), "")
+    return "time_s" in header.split(",")
+
+
+def architecture_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str], str]:
+    """Faults of an architecture and of its components, and what it is about."""
+    faults = table_faults(str(path), contents, MODELS[kind])
+    for key in COMPONENTS:
+        if is_component(value := contents.get(key)):
+            try:
+                part = component_contents(path, key, value, {})
+            except DataError as error:
+                faults += lines_of(error)
+                continue
+            faults += table_faults(part.place, part.contents, MODELS[key])
+    if faults:
+        return faults, ""
+    car = load_architecture(path.absolute() if path.suffix != ".toml" else path)
+    return [], f"{car.name}: {car.description}" if car.description else car.name
+
+
+def is_component(value: Any) -> bool:
+    """Whether a value names the file of a component."""
+    named = isinstance(value, dict) and isinstance(value.get("file"), str)
+    return isinstance(value, str) or named
+
+
+def component_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str], str]:
+    """Faults of a component by itself and, without any, in a shipped car; what it is about."""
+    faults = table_faults(str(path), contents, MODELS[kind])
+    if not faults:
+        load_architecture(_TRIED_IN, {kind: str(path.absolute())})
+    return faults, str(contents.get("name", ""))
+
+
+def cycle_finding(path: Path) -> Finding:
+    """What is wrong with a cycle, in its first lines, or how long it is."""
+    found = faults_in(path)
+    if found:
+        left = len(found) - _LINES_LISTED
+        listed = found[:_LINES_LISTED] + ([f"and {left} more"] if left > 0 else [])
+        faults = [f"{path}{',' if f.startswith('line ') else ':'} {f}" for f in listed]
+        return Finding(path, CYCLE, "", faults, len(found))
+    cycle = load_cycle(path.absolute())
+    about = (
+        f"{cycle.name}: {cycle.duration_s:g} s, {cycle.distance_m / 1e3:.2f} km, up to "
+        f"{cycle.speed_mps.max() * KMH_PER_MPS:.1f} km/h"
+    )
+    return finding(path, CYCLE, about, [])
+
+
+def table_faults(place: str, contents: dict[str, Any], model: type[FileModel]) -> list[str]:
+    """Faults of a table, each with `place` in front."""
+    return [f"{place}: {fault}" for fault in faults_of(contents, model, _KEYS_LISTED)[1]]
+
+
+def tried(path: Path, key: str, read: Callable[[], object]) -> list[str]:
+    """Faults of a key of a file, told by an error of `read`."""
+    try:
+        read()
+    except DataError as error:
+        return [f"{path}, {key}: {line}" for line in lines_of(error)]
+    return []
+
+
+def lines_of(error: HevoptError) -> list[str]:
+    """The faults that an error lists, each with the file in front."""
+    head, *faults = str(error).split("\n  ")
+    place = head.rpartition(": ")[0]
+    return [f"{place}: {fault}" for fault in faults] or [head]
