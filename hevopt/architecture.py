@@ -160,8 +160,13 @@ def component_contents(
     name = component if isinstance(component, str) else component["file"]
     beside = path.parent if is_path(name, ".toml") else path.parent / "components"
     folder = beside if beside.is_dir() else shipped_folder("architectures") / "components"
+
+    def fits(stem: str) -> bool:
+        """Whether a file's name, such as engine_x or my_engine, tells of no other kind of component."""
+        return key in stem or not any(other in stem for other in COMPONENTS)
+
     try:
-        found = find("architectures/components", name, ".toml", beside=folder)
+        found = find("architectures/components", name, ".toml", beside=folder, fits=fits)
     except DataError as error:
         raise DataError(f"{path}, {key}: {error}") from None
     table, place = read_contents(found), str(found)

@@ -89,6 +89,10 @@ def _wanted(components: Sequence[str]) -> list[str]:
     if list(components) == ["all"]:
         return list(COMPONENTS)
     for key in components:
+        if key == "all":
+            raise DataError(
+                f"--components {printable(','.join(components))}: all stands alone; leave the others out"
+            )
         if key not in COMPONENTS:
             raise unknown_name("component", key, [*COMPONENTS, "all"])
     return list(components)

@@ -23,6 +23,9 @@ _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY_PATH = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{9}}")
 # Signs of a key or a table's header; there are a few more where comments or texts hold them.
 _KEY_OR_HEADER = re.compile(r"=|^[ \t]*\[[^\],\n]*\.[^\],\n]*\.", re.MULTILINE)
+_DOUBLED = re.compile(r"Cannot overwrite a value \(at (?:line (?P<line>\d+), column \d+|.*)\)")
+_TUPLE = re.compile(r"\((?:'[^']*'(?:, |,|(?=\))))+\)")
+_KEY_IN_LINE = re.compile(rf"[ \t]*(?:\[+[^\]\n]+\]+|{_PART}(?:[ \t]*\.[ \t]*{_PART})*[ \t]*=)")
 # Tags by which a key takes values of several shapes; they stand in a fault's location, not in the file.
 SHAPES = ("a number", "a list", "a table", "a name")
 _NEEDED = {
@@ -82,7 +85,7 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
         contents = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{path}: not valid TOML: {error}") from None
+        raise DataError(f"{path}: not valid TOML: {_said(str(error), text)}") from None
     except ValueError:
         raise DataError(f"{path}: not valid TOML: a number has too many digits") from None
     except RecursionError:
@@ -97,6 +100,20 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
     if keys > _KEYS_MAX:
         raise DataError(f"{path}: {keys} keys; allowed: up to {_KEYS_MAX} in a data file")
     return contents
+
+
+def _said(message: str, text: str) -> str:
+    """What the TOML reader says, with the key where it names the place behind a doubled one only."""
+    found = _DOUBLED.fullmatch(message)
+    if not found:  # key paths stand there as Python tuples
+        return _TUPLE.sub(lambda key: ".".join(re.findall("'([^']*)'", key[0])), message)
+    lines = text.splitlines()
+    last = int(found["line"] or len(lines))
+    keys = [(n, key) for n, line in enumerate(lines[:last], 1) if (key := _KEY_IN_LINE.match(line))]
+    if not keys:
+        return message
+    line, key = keys[-1]
+    return f"{printable(key[0].strip(' ='))} is given twice (line {line}); leave one out"
 
 
 def checked(place: str, contents: dict[str, Any], model: type[Model]) -> Model:

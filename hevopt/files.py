@@ -4,6 +4,8 @@ A path is anything with a separator or a suffix; it is taken as it stands. A nam
 shipped files, which lie inside the installed package, or beside it in a checkout.
 """
 
+from collections.abc import Callable, Iterable
+from datetime import date, time
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
@@ -31,14 +33,23 @@ def is_path(text: str, suffix: str) -> bool:
     return "/" in text or "\\" in text or text.endswith(suffix)
 
 
-def find(kind: str, name: str | Path, suffix: str, beside: Path | None = None) -> Path:
-    """The file for a name or a path; `beside` is a folder searched before the shipped ones."""
+def find(
+    kind: str,
+    name: str | Path,
+    suffix: str,
+    beside: Path | None = None,
+    fits: Callable[[str], bool] = lambda name: True,
+) -> Path:
+    """The file for a name or a path; `beside` is a folder searched before the shipped ones.
+
+    fits: which names a message may propose
+    """
     text, word = str(name), Path(kind).name.removesuffix("s")
     if not text.strip() or "\0" in text:
         raise DataError(f"{word} name {text!r} is empty or not a name; give a name or a path")
     try:
         if is_path(text, suffix):
-            return _file_at(text, kind, word, suffix, beside)
+            return _file_at(text, kind, word, suffix, beside, fits)
         for folder in filter(None, (beside, shipped_folder(kind))):
             if (folder / f"{text}{suffix}").is_file():
                 return folder / f"{text}{suffix}"
@@ -46,10 +57,22 @@ def find(kind: str, name: str | Path, suffix: str, beside: Path | None = None) -
         raise DataError(
             f"{word} {shown(text)} cannot be looked up ({error.strerror}); check the name or path"
         ) from None
-    raise unknown_name(word, text, shipped_names(kind, suffix))
+    known = [*_names_in(beside, suffix), *shipped_names(kind, suffix)]
+    raise unknown_name(word, text, list(filter(fits, dict.fromkeys(known))))
 
 
-def _file_at(text: str, kind: str, word: str, suffix: str, beside: Path | None) -> Path:
+def _names_in(folder: Path | None, suffix: str) -> list[str]:
+    return [] if folder is None else sorted(printable(p.stem) for p in folder.glob(f"*{suffix}"))
+
+
+def _file_at(
+    text: str,
+    kind: str,
+    word: str,
+    suffix: str,
+    beside: Path | None,
+    fits: Callable[[str], bool],
+) -> Path:
     path, text = Path(text), printable(text)
     for candidate in (beside / path, path) if beside else (path,):
         if candidate.is_file():
@@ -58,11 +81,19 @@ def _file_at(text: str, kind: str, word: str, suffix: str, beside: Path | None) 
         raise DataError(f"{word} file {text} is a folder; give the path of a {suffix} file")
     if path.exists():
         raise DataError(f"{word} file {text} is not a regular file; give a {suffix} file or a name")
-    close = get_close_matches(path.stem, shipped_names(kind, suffix), n=3)
-    hint = f"shipped with a close name: {', '.join(close)}; " if close else ""
+    there = _names_in((beside or Path()) / path.parent, suffix)
+    hint = _close("there with a close name", path.stem, filter(fits, there))
+    hint += _close(
+        "shipped with a close name", path.stem, filter(fits, shipped_names(kind, suffix))
+    )
     raise DataError(
         f"{word} file {text} does not exist; {hint}give the path of a {suffix} file or a name"
     )
+
+
+def _close(what: str, name: str, known: Iterable[str]) -> str:
+    close = get_close_matches(name, known, n=3)
+    return f"{what}: {', '.join(close)}; " if close else ""
 
 
 def read_text(path: Path, megabytes_max: int) -> str:
@@ -86,10 +117,23 @@ def read_text(path: Path, megabytes_max: int) -> str:
 def shown(value: object) -> str:
     """A value of a file as a message quotes it: on one line, printable, and short."""
     try:
-        text = repr(value)
+        text = _as_in_toml(value)
     except (ValueError, RecursionError):  # thousands of digits, or of brackets
         return f"a very long {type(value).__name__}"
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 3] + "..."
+
+
+def _as_in_toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if isinstance(value, list):
+        return f"[{', '.join(map(_as_in_toml, value))}]"
+    if isinstance(value, dict) and value:
+        inner = (f"{printable(str(key))} = {_as_in_toml(found)}" for key, found in value.items())
+        return f"{{ {', '.join(inner)} }}"
+    return repr(value)
 
 
 def printable(text: str) -> str:

@@ -215,3 +215,8 @@ def test_units_are_those_of_the_keys_suffixes():
                 assert unit == SUFFIX_UNITS[suffix], key
                 checked += 1
     assert checked > 40
+
+
+def test_all_components_and_a_name_beside_are_refused_with_what_to_do():
+    with pytest.raises(DataError, match="--components all,engine: all stands alone"):
+        new_files("mine", "C2", components=["all", "engine"])

@@ -192,7 +192,7 @@ def test_harmless_oddities_of_a_cycle(hevopt, spoilt):
         ("x", "[coupling]", "[[coupling]]", ["coupling = [{", "a table [coupling] is needed"]),
         ("x", "second_clutch = true", "", ["'gearbox_input' needs second_clutch"]),
         ("x", "70.0", '"70"', ["hybrid_mass_kg = '70'", "number"]),
-        ("x", "70.0", "true", ["hybrid_mass_kg = True", "number"]),
+        ("x", "70.0", "true", ["hybrid_mass_kg = true", "number"]),
         ("x", "70.0", "nan", ["hybrid_mass_kg = nan", "finite"]),
         ("x", "70.0", "1e308", ["hybrid_mass_kg = 1e+308", "5000"]),
         ("x", "70.0", "9" * 400, ["hybrid_mass_kg = 999"]),

@@ -310,3 +310,33 @@ def test_every_fault_of_a_sweep_is_listed_beside_unknown_keys(folder):
         "sample.method = 'x'",
     ):
         assert sum(words in fault for fault in faults) == 1, (words, faults)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name = 'x'\nidle = 1\n'my key' = 2\n'my key' = 3\nz = 1\n", "'my key' is given twice (line 4)"),
+        ("[fuel]\nname = 1\nname = 2", "name is given twice (line 3); leave one out"),
+        ("[a.b]\n[a.b]\n", "Cannot declare a.b twice (at line 2"),
+        ("[coupling]\nkind = true\nsecond_clutch = 2024-01-01\n", "kind = true: allowed:"),
+        ("[coupling]\nkind = 'none'\nsecond_clutch = 2024-01-01\n", "second_clutch = 2024-01-01: true"),
+        ("[coupling]\nkind = 'none'\nsecond_clutch = [true, { a = 1 }]\n", "= [true, { a = 1 }]: true"),
+    ],
+)  # fmt: skip
+def test_messages_about_toml_name_the_key_and_speak_toml(folder, text, words):
+    Path("x.toml").write_text(text)
+    assert any(words in fault for fault in validate("x.toml").faults), validate("x.toml").faults
+
+
+def test_close_matches_of_a_component_are_those_of_its_kind_beside_the_file_too(folder):
+    car = (SHIPPED / "C2.toml").read_text()
+    (folder / "components").mkdir()
+    for name in ("my_C2_engine", "my_C2_gearbox", "diesel_small"):
+        (folder / "components" / f"{name}.toml").write_text("")
+    for name, words in [
+        ("my_C2_engin", "close matches: my_C2_engine; available: diesel_small, my_C2_engine, engine_"),
+        ("./components/my_C2_engin.toml", "there with a close name: my_C2_engine; give the path"),
+    ]:  # fmt: skip
+        Path("car.toml").write_text(re.sub("^engine = .*", f'engine = "{name}"', car, flags=re.M))
+        (fault,) = validate("car.toml").faults
+        assert words in fault and "gearbox" not in fault.split("engine:")[1], fault

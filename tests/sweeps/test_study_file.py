@@ -124,7 +124,7 @@ def test_every_wrong_key_and_value_is_reported_at_once_with_its_place_in_the_stu
         ("{ from = 1, to = 2, cuont = 3 }", "unknown key cuont; close matches: count"),
         ("{ from = nan, to = 2, count = 3 }", "from = nan: allowed: -1e+15 to 1e+15"),
         ("{ from = 1, to = inf, count = 3 }", "to = inf: allowed: -1e+15 to 1e+15"),
-        ("{ from = true, to = 2, count = 3 }", "from = True: a number is needed"),
+        ("{ from = true, to = 2, count = 3 }", "from = true: a number is needed"),
         ("{}", "from is missing"),
         ("2e4", "a list [...] or a range { from = , to = , count = } is needed"),
         ("[]", "0 entries; needed: 1 to 10000"),
@@ -149,7 +149,7 @@ def test_a_wrong_list_or_range_is_refused_with_what_is_allowed(fault, value, wor
         ("parameters = 3", "a table [parameters] is needed"),
         ('strategie = ["dp"]\n[parameters]\nnox_weight = [0]', "unknown key strategie"),
         ("[parameters]\nnox_weight = ['a']", "parameters.nox_weight = 'a'; allowed: 0 to 1e+06"),
-        ("[parameters]\nnox_weight = [true]", "parameters.nox_weight = True; allowed: 0 to 1e+06"),
+        ("[parameters]\nnox_weight = [true]", "parameters.nox_weight = true; allowed: 0 to 1e+06"),
         (
             "[parameters]\nnox_weight = [0]\n[sample]\nmethod = 'sobol'\ncount = 0",
             "sample.count = 0; allowed: 1 to 1e+06",
