@@ -2,7 +2,8 @@
 
 Fuel is charge-corrected, so that a change shows and not what was left in the battery. A rule-based strategy
 calibrates its thresholds again for each value. The elasticity is per cent of fuel per per cent of the figure, from
-the lowest to the highest value: d ln(fuel) / d ln(figure).
+the lowest to the highest value: d ln(fuel) / d ln(figure). A value at which the car cannot be solved has no figures
+but a reason; all others keep theirs.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.architecture import load_architecture
-from hevopt.case import prepare
+from hevopt.case import Case, prepare
 from hevopt.cycle import Cycle, load_cycle
 from hevopt.datafile import read_contents
 from hevopt.errors import HevoptError
@@ -22,6 +23,8 @@ from hevopt.strategies import fitting, strategy_named
 from hevopt.study import run_case
 
 SHARE = 0.1
+# Fuel or NOx of less is none: a change against it has no meaning.
+_TINY = 1e-9
 # The optimum, and the rule that drives the car: the first that fits.
 _RULES = ("conventional", "start_stop", "baseline")
 _STEEP_NOX = "engine_diesel_1600_steep_nox"
@@ -79,9 +82,10 @@ PARAMETERS = (
 class Effect:
     """What one parameter does to one strategy's result; lists have one entry per value.
 
-    fuel_l_per_100km: charge-corrected; delta_*: change against the car as given, per cent
-    elasticity: None where a value or a result is 0, or the values cannot be put in proportion
-    NOx is None where the engine has no data on it
+    fuel_l_per_100km: charge-corrected, None where the value cannot be solved; reasons: why, None where it is
+    delta_*: change against the car as given, per cent, None where that burns or emits nothing
+    elasticity: None where a value or a result is 0 or lacks, or the values cannot be put in proportion
+    NOx is None where the engine has no data on it, too
     """
 
     architecture: str
@@ -89,12 +93,13 @@ class Effect:
     parameter: str
     unit: str
     values: list[float]
-    fuel_l_per_100km: list[float]
-    delta_percent: list[float]
+    fuel_l_per_100km: list[float | None]
+    delta_percent: list[float | None]
     nox_mg_per_km: list[float | None]
     delta_nox_percent: list[float | None]
     elasticity: float | None
     elasticity_nox: float | None
+    reasons: list[str | None]
 
     def as_dict(self) -> dict[str, Any]:
         """All fields by name, in order."""
@@ -117,14 +122,16 @@ def sensitivities(
     *,
     nox_weight: float = 0.0,
     allow_shortfall: bool = False,
+    refine: bool = False,
     base: Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] = lambda text, done, total: None,
 ) -> list[Effect]:
     """The effect of every parameter that the architecture has, strategy by strategy.
 
-    strategies: by default dynamic programming and the rule that fits the car
+    strategies: by default dynamic programming and the rule that fits the car; refine: see case.prepare
     base: key path -> value of what is another in the car from the start, see load_architecture
     progress: called with the value that comes next, and how many are done of how many
+    Raises HevoptError where the car as given cannot be solved.
     """
     trace = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
     car = load_architecture(architecture, base)
@@ -135,29 +142,46 @@ def sensitivities(
     total = 1 + sum(1 for trial in trials for changes in trial.changes if changes)
     done = 0
 
-    def rows(changes: Mapping[str, Any], what: str) -> dict[str, Row]:
+    def solved(changes: Mapping[str, Any], what: str) -> dict[str, Row | HevoptError]:
         nonlocal done
         progress(f"{car.name}: {what}", done, total)
+        done += 1
         try:
             changed = load_architecture(architecture, {**(base or {}), **changes})
-            case = prepare(changed, trace, nox_weight=nox_weight, allow_shortfall=allow_shortfall)
-            solved = {name: run_case(case, name)[0] for name in names}
+            case = prepare(
+                changed,
+                trace,
+                nox_weight=nox_weight,
+                allow_shortfall=allow_shortfall,
+                refine=refine,
+            )
         except HevoptError as error:
-            raise type(error)(f"{car.name}, {what}: {error}") from None
-        done += 1
-        return solved
+            return dict.fromkeys(names, error)
+        return {name: _row(case, name) for name in names}
 
-    given = rows({}, "as given")
+    given = {name: _required(car.name, row) for name, row in solved({}, "as given").items()}
     effects: list[Effect] = []
     for trial in trials:
-        solved = [
-            rows(changes, f"{trial.parameter.name} {value:g}") if changes else given
+        found = [
+            solved(changes, f"{trial.parameter.name} {value:g}") if changes else given
             for value, changes in zip(trial.values, trial.changes, strict=True)
         ]
-        effects += [
-            _effect(trial, given[name], [by_name[name] for by_name in solved]) for name in names
-        ]
+        effects += [_effect(trial, given[name], [rows[name] for rows in found]) for name in names]
     return sorted(effects, key=lambda effect: names.index(effect.strategy))
+
+
+def _row(case: Case, strategy: str) -> Row | HevoptError:
+    try:
+        return run_case(case, strategy)[0]
+    except HevoptError as error:
+        return error
+
+
+def _required(car: str, row: Row | HevoptError) -> Row:
+    """The row of the car as given, without which there is nothing to compare with."""
+    if isinstance(row, HevoptError):
+        raise type(row)(f"{car}, as given: {row}") from None
+    return row
 
 
 def _usual(functions: frozenset[str]) -> list[str]:
@@ -221,9 +245,9 @@ def _times(value: Any, factor: float) -> Any:
     return [_times(entry, factor) for entry in value] if isinstance(value, list) else value * factor
 
 
-def _effect(trial: _Trial, given: Row, rows: Sequence[Row]) -> Effect:
-    fuel = [float(row.fuel_corrected_l_per_100km) for row in rows]
-    nox = [row.nox_mg_per_km for row in rows]
+def _effect(trial: _Trial, given: Row, rows: Sequence[Row | HevoptError]) -> Effect:
+    fuel = [None if isinstance(r, HevoptError) else r.fuel_corrected_l_per_100km for r in rows]
+    nox = [None if isinstance(r, HevoptError) else r.nox_mg_per_km for r in rows]
     return Effect(
         given.architecture,
         given.strategy,
@@ -231,16 +255,42 @@ def _effect(trial: _Trial, given: Row, rows: Sequence[Row]) -> Effect:
         trial.parameter.unit,
         trial.values,
         fuel,
-        [100 * (f / float(given.fuel_corrected_l_per_100km) - 1) for f in fuel],
+        [_change(value, given.fuel_corrected_l_per_100km) for value in fuel],
         nox,
-        [100 * (n / given.nox_mg_per_km - 1) if given.nox_mg_per_km else None for n in nox],
+        [_change(value, given.nox_mg_per_km) for value in nox],
         _elasticity(trial.values, fuel),
-        None if None in nox else _elasticity(trial.values, nox),
+        _elasticity(trial.values, nox),
+        [_first_line(row) if isinstance(row, HevoptError) else None for row in rows],
     )
 
 
-def _elasticity(values: Sequence[float], results: Sequence[float]) -> float | None:
-    ends = (values[0], values[-1], results[0], results[-1])
-    if min(ends) <= 0 or values[0] == values[-1]:
+def _first_line(error: HevoptError) -> str:
+    return str(error).splitlines()[0].rstrip(":")
+
+
+def _change(value: float | None, base: float | None) -> float | None:
+    if value is None or base is None or base < _TINY:
         return None
-    return log(results[-1] / results[0]) / log(values[-1] / values[0])
+    return 100 * (value / base - 1)
+
+
+def _elasticity(values: Sequence[float], results: Sequence[float | None]) -> float | None:
+    first, last = results[0], results[-1]
+    if first is None or last is None or values[0] == values[-1]:
+        return None
+    if min(values[0], values[-1]) <= 0 or min(first, last) < _TINY:
+        return None
+    return log(last / first) / log(values[-1] / values[0])
+
+
+def unsolved(effects: Sequence[Effect]) -> list[str]:
+    """Lines that name every value without figures, and why; once where the reason is that of every strategy."""
+    lines = []
+    for effect in effects:
+        reasons = effect.reasons or [None] * len(effect.values)  # saved by an older version
+        lines += [
+            f"{effect.architecture}, {effect.parameter} {value:.4g}: {reason}"
+            for value, reason in zip(effect.values, reasons, strict=True)
+            if reason is not None
+        ]
+    return list(dict.fromkeys(lines))

@@ -3,14 +3,15 @@
 import json
 from functools import cache
 from math import log
+from pathlib import Path
 
 import pytest
 from command_line import call
 
-from hevopt import InfeasibleError, load_architecture, load_cycle
+from hevopt import InfeasibleError, SolverError, load_architecture, load_cycle
 from hevopt.case import prepare
 from hevopt.pages.saved import load_results
-from hevopt.sensitivity import sensitivities
+from hevopt.sensitivity import sensitivities, unsolved
 from hevopt.study import run_case
 
 
@@ -70,9 +71,65 @@ def test_what_is_changed_from_the_start_is_the_car_that_is_compared_with():
     assert "NOx map, high over low load" not in effects  # it has the other one already
 
 
-def test_a_value_that_cannot_be_driven_is_named():
-    with pytest.raises(InfeasibleError, match=r"^A, vehicle mass 3740: "):
-        sensitivities("A", "nedc", base={"car.mass_kg": 3400})
+def test_a_value_that_cannot_be_driven_has_no_figures_but_a_reason_and_the_others_keep_theirs():
+    effects = {e.parameter: e for e in sensitivities("A", "nedc", base={"car.mass_kg": 3400})}
+    mass = effects.pop("vehicle mass")
+    assert mass.values[-1] == pytest.approx(3740)
+    for figures in (mass.fuel_l_per_100km, mass.delta_percent, mass.nox_mg_per_km):
+        assert figures[-1] is None and None not in figures[:2]
+    assert mass.elasticity is None and mass.reasons[:2] == [None, None]
+    assert unsolved([mass, mass]) == [f"A, vehicle mass 3740: {mass.reasons[-1]}"]
+    assert "cannot follow the cycle at" in mass.reasons[-1]
+    assert unsolved([e for e in effects.values() if e.unit == "W"]) == []
+
+
+def test_a_car_that_cannot_be_solved_as_given_is_named():
+    with pytest.raises(InfeasibleError, match=r"^A, as given: "):
+        sensitivities("A", "nedc", base={"car.mass_kg": 9000})
+
+
+def test_where_nothing_is_burnt_there_is_no_change(hevopt):
+    Path("drv.csv").write_text("time_s,speed_kmh\n0,0\n3,20\n6,20\n9,0\n")
+    words = ("sensitivity", "C2", "--cycle", "drv.csv", "--soc-start", "0.75", "--soc-end", "0.5")
+    status, out, err = hevopt(*words)
+    assert status == 0, err
+    assert "- / - / -" in out and "burns or emits nothing" in out
+    for effect in json.loads(hevopt(*words, "--json").out)["sensitivity"]:
+        assert effect["elasticity"] is None and set(effect["delta_percent"]) == {None}
+
+
+def test_a_comparison_is_shown_and_written_whatever_a_value_does(hevopt):
+    """1650 kg cannot be driven."""
+    words = "compare --cycle us06 --architectures C2 --strategies dp --mass 1500 --sensitivity"
+    status, out, err = hevopt(*words.split(), "--report", "page.html", "--save", "saved.gz")
+    assert status == 0 and "C2" in out, err
+    mass = next(e for e in load_results(Path("saved.gz")).sensitivity if "mass" in e.parameter)
+    assert mass.delta_percent[-1] is None and mass.delta_percent[0] < 0
+    assert "C2, vehicle mass 1650: " in Path("page.html").read_text()
+
+
+def test_what_a_car_lacks_costs_the_comparison_nothing(hevopt, monkeypatch):
+    def failing(car, *_, **__):
+        if "B" in str(car):
+            raise InfeasibleError("B fails")
+        return sensitivities(car)
+
+    def no_front(*_, **__):
+        raise SolverError("no front")
+
+    monkeypatch.setattr("hevopt.sensitivity.sensitivities", failing)
+    monkeypatch.setattr("hevopt.pareto.front", no_front)
+    words = ("--sensitivity", "--fronts", "--save", "saved.gz", "--out", "rows.csv")
+    status, out, err = hevopt("compare", "--architectures", "A,B", "--strategies", "dp", *words)
+    assert status == 3 and "B sensitivity: B fails" in err and "A front: no front" in err
+    assert "results written to saved.gz" in out and Path("rows.csv").is_file()
+    results = load_results(Path("saved.gz"))
+    assert {effect.architecture for effect in results.sensitivity} == {"A"}
+    assert results.pareto == [] and results.failures["B sensitivity"] == "B fails"
+    status, out, _ = hevopt(
+        "compare", "--architectures", "A,B", "--strategies", "dp", *words, "--json"
+    )
+    assert status == 3 and len(json.loads(out)["rows"]) == 2
 
 
 def test_the_command_shows_what_the_json_holds(monkeypatch, capsys):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hevopt.commands.reporting import command_line, write_files
 from hevopt.commands.terminal import show, write
-from hevopt.errors import DataError
+from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
     from hevopt.case import Case
@@ -115,22 +115,26 @@ class Files:
 
             self._driven.append((row, step_columns(case, trajectory)))
 
-    def write(self, job: Job, comparison: "Comparison") -> list[str]:
-        """Write all of them; a line for each."""
+    def write(self, job: Job, comparison: "Comparison") -> tuple[list[str], dict[str, HevoptError]]:
+        """Write all of them; a line for each, and the fronts and sensitivities that failed."""
         from hevopt import outputs
 
-        lines = self._write_page(job, comparison)
+        lines = []
+        # The page goes last: fronts and sensitivities take longer than all rows.
         if self.out is not None:
             outputs.write_rows(self.out, comparison, job.about)
             lines.append(f"rows written to {self.out}")
         if self.steps is not None:
             outputs.write_steps(self.steps, comparison, outputs.joined(self._driven), job.about)
             lines.append(f"steps written to {self.steps}")
-        return lines
+        of_page, failures = self._write_page(job, comparison)
+        return lines + of_page, failures
 
-    def _write_page(self, job: Job, comparison: "Comparison") -> list[str]:
+    def _write_page(
+        self, job: Job, comparison: "Comparison"
+    ) -> tuple[list[str], dict[str, HevoptError]]:
         if self._collector is None:
-            return []
+            return [], {}
         from hevopt.commands.studies import with_studies
 
         results = self._collector.results(
@@ -140,14 +144,14 @@ class Files:
             others=[job.settings.file] if job.settings.file is not None else [],
             published=not any(job.cars.changes.values()),
         )
-        results = with_studies(
+        results, failures = with_studies(
             results, job.cars, job.trace, job.settings, fronts=self.fronts, effects=self.effects
         )
-        return write_files(results, self.page, self.save)
+        return write_files(results, self.page, self.save), failures
 
 
-def show_comparison(job: Job, comparison: "Comparison", lines: list[str], *, json: bool) -> None:
-    """Print the rows as a table with notes, published figures and some last lines, or all as JSON."""
+def show_comparison(job: Job, comparison: "Comparison", *, json: bool) -> None:
+    """Print the rows as a table with notes and published figures, or as JSON."""
     from hevopt import outputs, report
 
     if json:
@@ -159,5 +163,3 @@ def show_comparison(job: Job, comparison: "Comparison", lines: list[str], *, jso
     published = None if any(job.cars.changes.values()) else report.published_table(comparison)
     if published is not None:
         show(published)
-    for line in lines:
-        write(line)

@@ -95,11 +95,16 @@ def compare(
             progress=progress,
             observe=files.observe,
         )
-    show_comparison(job, comparison, files.write(job, comparison), json=json)
-    for case, error in comparison.failures.items():
+    # Before the files, which may take long: what is solved is seen whatever becomes of them.
+    show_comparison(job, comparison, json=json)
+    lines, of_files = files.write(job, comparison)
+    for line in () if json else lines:
+        write(line)
+    failures = comparison.failures | of_files
+    for case, error in failures.items():
         print(f"hevopt: {case}: {error}", file=sys.stderr)
-    if comparison.failures:
-        raise typer.Exit(max(error.exit_status for error in comparison.failures.values()))
+    if failures:
+        raise typer.Exit(max(error.exit_status for error in failures.values()))
 
 
 @takes_settings

@@ -13,7 +13,7 @@ from hevopt.commands.options import (
     takes_settings,
 )
 from hevopt.commands.terminal import Progress, listed, show, write
-from hevopt.errors import DataError
+from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
     from hevopt.architecture import Architecture
@@ -96,7 +96,7 @@ def sensitivity(
     json: JsonOption = False,
 ) -> None:
     """How fuel and NOx move with mass, resistances, losses, auxiliaries, battery and NOx map."""
-    from hevopt.commands.studies_view import EFFECTS_NOTES, SHORTFALL_NOTE, effects_table
+    from hevopt.commands.studies_view import SHORTFALL_NOTE, effects_notes, effects_table
     from hevopt.cycle import load_cycle
     from hevopt.study_file import cars_of, settings_of
 
@@ -110,7 +110,7 @@ def sensitivity(
         return
     for strategy in dict.fromkeys(effect.strategy for effect in effects):
         show(effects_table([effect for effect in effects if effect.strategy == strategy], trace))
-    write(EFFECTS_NOTES)
+    write(effects_notes(effects))
     if settings.get("allow_shortfall", False):
         write(SHORTFALL_NOTE)
 
@@ -138,24 +138,33 @@ def with_studies(
     *,
     fronts: bool,
     effects: bool,
-) -> "Results":
-    """The results of a comparison with the fronts and sensitivities of its cars, where asked for."""
+) -> tuple["Results", dict[str, HevoptError]]:
+    """The results of a comparison with the fronts and sensitivities of its cars, where asked for; what failed.
+
+    A car whose front or sensitivities cannot be had is a failure, and costs no other result.
+    """
     from hevopt.pages.results import ParetoFront, Sensitivity
 
-    solved = [car for car in cars.cars if car.name in results.cars]
-    added: dict[str, Any] = {}
+    wanted = [car for car in cars.cars if car.name in results.cars]
+    added: dict[str, list] = {"pareto": [], "sensitivity": []}
+    failures: dict[str, HevoptError] = {}
     with Progress() as progress:
-        if fronts:
-            drawn = [_front(car, trace, settings, progress)[0] for car in solved]
-            added["pareto"] = [ParetoFront.model_validate(figures) for figures in drawn]
-        if effects:
-            found = [
-                effect
-                for car in solved
-                for effect in _effects(car, cars, trace, settings, progress)
-            ]
-            added["sensitivity"] = [Sensitivity.model_validate(e.as_dict()) for e in found]
-    return results.model_copy(update=added)
+        for car in wanted if fronts else ():
+            try:
+                figures, _ = _front(car, trace, settings, progress)
+                added["pareto"].append(ParetoFront.model_validate(figures))
+            except HevoptError as error:
+                failures[f"{car.name} front"] = error
+        for car in wanted if effects else ():
+            try:
+                found = _effects(car, cars, trace, settings, progress)
+                added["sensitivity"] += [Sensitivity.model_validate(e.as_dict()) for e in found]
+            except HevoptError as error:
+                failures[f"{car.name} sensitivity"] = error
+    said = results.failures | {name: str(error) for name, error in failures.items()}
+    asked = {"pareto": fronts, "sensitivity": effects}
+    update = {name: lines for name, lines in added.items() if asked[name]}
+    return results.model_copy(update=update | {"failures": said}), failures
 
 
 def _front(

@@ -12,12 +12,16 @@ from rich.text import Text
 
 from hevopt.architecture import Architecture
 from hevopt.cycle import Cycle
-from hevopt.sensitivity import Effect
+from hevopt.sensitivity import Effect, unsolved
 from hevopt.writing import write_whole
 
-EFFECTS_NOTES = """fuel: charge-corrected, change against the car as given. elasticity: per cent of fuel (NOx) per
+_EFFECTS_NOTES = """fuel: charge-corrected, change against the car as given. elasticity: per cent of fuel (NOx) per
 per cent of the parameter. Everything is solved afresh for each value, thresholds of rules calibrated anew. NOx is
 what the plan of least fuel happens to emit, unless --nox-weight gives it a weight."""
+_UNSOLVED = "-: no figure, as the car cannot be solved there:"
+_NOTHING = (
+    "-: no change, as the car as given burns or emits nothing, or its engine has no data on NOx."
+)
 SHORTFALL_NOTE = "Where the car cannot follow, each value drives on with less than the cycle asks."
 
 
@@ -84,6 +88,19 @@ def effects_table(effects: Sequence[Effect], trace: Cycle) -> Table:
         ]
         table.add_row(*map(Text, cells))
     return table
+
+
+def effects_notes(effects: Sequence[Effect]) -> str:
+    """What the columns mean, and why figures lack."""
+    without = unsolved(effects)
+    nothing = any(
+        change is None and reason is None
+        for effect in effects
+        for changes in (effect.delta_percent, effect.delta_nox_percent)
+        for change, reason in zip(changes, effect.reasons, strict=True)
+    )
+    lines = [_EFFECTS_NOTES, *([_NOTHING] if nothing else []), *([_UNSOLVED] if without else [])]
+    return "\n".join([*lines, *without])
 
 
 def _empty(title: str, heads: Sequence[str], align: str) -> Table:

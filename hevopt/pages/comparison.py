@@ -7,6 +7,7 @@ from typing import Any
 from hevopt.pages.page import render
 from hevopt.pages.results import Item, Results, Row, Sensitivity
 from hevopt.pages.verdict import alerts, best_rows, verdict
+from hevopt.sensitivity import unsolved
 
 _J_PER_KWH = 3.6e6
 
@@ -29,6 +30,7 @@ def comparison_page(results: Results) -> str:
         spells=[_spells(row) for row in results.rows if row.detail is not None],
         chosen=_first_shown(results),
         effects=_effects(results),
+        unsolved=unsolved(results.sensitivity or []),
         calibrated=calibrated,
         studied=", ".join(name for name, found in studies if found).capitalize(),
         left_out=_left_out(results),

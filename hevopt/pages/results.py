@@ -208,19 +208,20 @@ class ParetoFront(FileModel):
 
 
 class Sensitivity(FileModel):
-    """How a result moves with one parameter; see `sensitivity.Effect`."""
+    """How a result moves with one parameter; see `sensitivity.Effect`. reasons: none in older files."""
 
     architecture: str
     strategy: str
     parameter: str
     unit: str
     values: list[float]
-    fuel_l_per_100km: list[float]
-    delta_percent: list[float]
+    fuel_l_per_100km: list[float | None]
+    delta_percent: list[float | None]
     nox_mg_per_km: list[float | None]
     delta_nox_percent: list[float | None]
     elasticity: float | None
     elasticity_nox: float | None
+    reasons: list[str | None] | None = None
 
 
 class Results(FileModel):
