@@ -4,9 +4,12 @@ Source: F. Millo, L. Rolando, M. Andreata, Numerical Simulation for Vehicle Powe
 Analysis - Theory and Application (2011), section 4.2: NEDC, warm, change against A, as the text gives them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from hevopt.architecture import Architecture, load_architecture
+from hevopt.cycle import Cycle, load_cycle
+from hevopt.provenance import cycle_contents
 from hevopt.study import Comparison
 
 # What the published changes are measured on and against.
@@ -14,6 +17,7 @@ CYCLE, REFERENCE = "nedc", "A baseline"
 # Published about the energy at the wheels, NEDC.
 WHEEL_WORK_MJPKM = 0.4
 HYBRIDS = ("C1", "C2", "D", "E")
+CARS = ("A", "B", *HYBRIDS)
 _BASE = ("A", "baseline")
 _WHOLE, _ABOUT = 0.5, 1.0
 
@@ -139,8 +143,20 @@ def cases_of(comparison: Comparison) -> dict[tuple[str, str], Figures]:
     }
 
 
+def is_study(cars: Iterable[Architecture], cycle: Cycle) -> bool:
+    """Whether a cycle and the cars under the study's names are as shipped, whatever files they come from.
+
+    Cars of other names stand in no statement and do not count.
+    """
+    if cycle_contents(cycle) != cycle_contents(load_cycle(CYCLE)):
+        return False
+    return all(
+        car.contents == load_architecture(car.name).contents for car in cars if car.name in CARS
+    )
+
+
 def published_beside(comparison: Comparison) -> list[Published]:
-    """The published statements with ours, where cycle, reference and objective are theirs."""
+    """The published statements with ours, where reference and objective are theirs, and the names; see is_study."""
     theirs = (comparison.cycle, comparison.reference) == (CYCLE, REFERENCE)
     if not theirs or comparison.free_gear or comparison.nox_weight:
         return []

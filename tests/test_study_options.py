@@ -223,11 +223,6 @@ def test_json_names_inputs_versions_and_settings(hevopt):
     assert found["settings"]["changes"] == {"C2": {"car.mass_kg": 1400.0}}
 
 
-def test_published_figures_are_not_set_beside_changed_cars(hevopt):
-    assert "published" in hevopt("compare", "--architectures", "A,B")[1]
-    assert "published" not in hevopt("compare", "--architectures", "A,B", "--mass", "1400")[1]
-
-
 def test_run_and_table_take_the_same_settings(hevopt):
     import numpy as np
 

@@ -47,6 +47,13 @@ class Job:
             },
         }
 
+    @cached_property
+    def is_study(self) -> bool:
+        """Whether published figures may stand beside the results: cars and cycle are the study's, as shipped."""
+        from hevopt.published import is_study
+
+        return is_study(self.cars.cars, self.trace)
+
     def changed(self) -> list[str]:
         """Lines that say what was changed in the cars, and what was left out."""
         said: dict[str, list[str]] = {}
@@ -142,7 +149,7 @@ class Files:
             command_line(),
             changes=job.changed(),
             others=[job.settings.file] if job.settings.file is not None else [],
-            published=not any(job.cars.changes.values()),
+            published=job.is_study,
         )
         results, failures = with_studies(
             results, job.cars, job.trace, job.settings, fronts=self.fronts, effects=self.effects
@@ -159,7 +166,6 @@ def show_comparison(job: Job, comparison: "Comparison", *, json: bool) -> None:
         return
     show(report.comparison_table(comparison))
     write("\n".join([report.comparison_notes(comparison), *job.changed()]) + "\n")
-    # Published figures are those of the shipped cars.
-    published = None if any(job.cars.changes.values()) else report.published_table(comparison)
+    published = report.published_table(comparison) if job.is_study else None
     if published is not None:
         show(published)

@@ -16,7 +16,7 @@ from hevopt.certificate import certify
 from hevopt.cycle import Cycle, load_cycle
 from hevopt.demand import demand_of
 from hevopt.problem import Plan
-from hevopt.published import CYCLE, HYBRIDS, Cases, Figures, cases_of, percent
+from hevopt.published import CARS, CYCLE, HYBRIDS, Cases, Figures, cases_of, percent
 from hevopt.reproduction import variations as v
 from hevopt.reproduction.variations import Variation, varied
 from hevopt.simulation import simulate
@@ -24,7 +24,6 @@ from hevopt.strategies import conventional, strategy_named
 from hevopt.study import Comparison, compare
 from hevopt.units import litres_per_100km
 
-CARS = ("A", "B", *HYBRIDS)
 _RULES = {"A": ("baseline",), "B": ("start_stop",)}
 _HYBRID_RULES = ("conventional", "nox_cut")
 CURVE_KW = tuple(range(15))
