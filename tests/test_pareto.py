@@ -178,3 +178,17 @@ def test_the_command_shows_and_writes_one_front(monkeypatch, capsys, tmp_path):
 def test_a_users_mistake_is_one_message(monkeypatch, capsys, words, said):
     status, _, err = call(monkeypatch, capsys, "pareto", "B", *words)
     assert status == 2 and said in err and "Traceback" not in err
+
+
+def test_a_refined_front_begins_at_the_refined_optimum(monkeypatch, capsys):
+    words = ("C2", "--refine", "--json")
+    status, out, err = call(monkeypatch, capsys, "pareto", *words, "--weights", "0")
+    assert status == 0, err
+    point = json.loads(out)["points"][0]
+    row = json.loads(call(monkeypatch, capsys, "run", *words).out)["rows"][0]
+    assert point["fuel_l_per_100km"] == row["fuel_l_per_100km"]
+    assert point["bound_l_per_100km"] <= point["fuel_l_per_100km"]
+    words = ("pareto", "C2", "--weights", "0")
+    assert "torque levels added" in call(monkeypatch, capsys, *words, "--refine").out
+    _, out, _ = call(monkeypatch, capsys, *words, "--json")
+    assert json.loads(out)["points"][0]["fuel_l_per_100km"] > point["fuel_l_per_100km"]

@@ -108,6 +108,22 @@ def test_a_comparison_is_shown_and_written_whatever_a_value_does(hevopt):
     assert "C2, vehicle mass 1650: " in Path("page.html").read_text()
 
 
+def test_studies_of_a_refined_comparison_are_refined(hevopt):
+    words = "compare --architectures B --strategies dp --refine --sensitivity --fronts --save s.gz"
+    status, _, err = hevopt(*words.split())
+    assert status == 0, err
+    results = load_results(Path("s.gz"))
+    row = results.rows[0].figures
+    assert results.pareto[0].points[0].fuel_l_per_100km == row.fuel_l_per_100km
+    for effect in results.sensitivity:
+        if effect.strategy == "dp":
+            assert row.fuel_corrected_l_per_100km in effect.fuel_l_per_100km
+    given = hevopt("sensitivity", "B", "--strategies", "dp", "--refine", "--json").out
+    assert json.loads(given)["sensitivity"] == [
+        effect.model_dump() for effect in results.sensitivity if effect.strategy == "dp"
+    ]
+
+
 def test_what_a_car_lacks_costs_the_comparison_nothing(hevopt, monkeypatch):
     def failing(car, *_, **__):
         if "B" in str(car):

@@ -10,6 +10,7 @@ from hevopt.commands.options import (
     ArchitectureArgument,
     CycleOption,
     JsonOption,
+    RefineOption,
     takes_settings,
 )
 from hevopt.commands.terminal import Progress, listed, show, write
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from hevopt.architecture import Architecture
     from hevopt.cycle import Cycle
     from hevopt.pages.results import Results
+    from hevopt.problem import Problem
     from hevopt.sensitivity import Effect
     from hevopt.study_file import Cars, Settings
 
@@ -44,6 +46,7 @@ def pareto(
     strategy: Annotated[
         str, typer.Option("--strategy", help="Strategy whose plans are the points.")
     ] = "dp",
+    refine: RefineOption = None,
     json: JsonOption = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Write points and outer front to this CSV file.")
@@ -59,7 +62,7 @@ def pareto(
     if weights is not None and points is not None:
         raise DataError("--weights and --points: choose one, the weights or how many to choose")
     chosen = None if weights is None else _numbers("--weights", weights)
-    settings = settings_of(_OPTIONS, given)
+    settings = settings_of(_OPTIONS, _with_refine(given, refine))
     cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
     if out is not None:
         _check_csv(out, [*cars.cars[0].files, *filter(None, [trace.source])])
@@ -79,7 +82,7 @@ def pareto(
         write(_json(figures | {"shortfall_steps": shortfall_steps} | _about(cars, trace)))
         return
     show(front_table(figures))
-    write(front_notes(figures, cars.cars[0], shortfall_steps))
+    write(front_notes(figures, cars.cars[0], shortfall_steps, refined=bool(refine)))
     if out is not None:
         write(f"front written to {out}")
 
@@ -93,6 +96,7 @@ def sensitivity(
         str | None,
         typer.Option("--strategies", help="Names, separated by commas (default: dp and the rule)."),
     ] = None,
+    refine: RefineOption = None,
     json: JsonOption = False,
 ) -> None:
     """How fuel and NOx move with mass, resistances, losses, auxiliaries, battery and NOx map."""
@@ -100,7 +104,7 @@ def sensitivity(
     from hevopt.cycle import load_cycle
     from hevopt.study_file import cars_of, settings_of
 
-    settings = settings_of(_OPTIONS, given)
+    settings = settings_of(_OPTIONS, _with_refine(given, refine))
     cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
     with Progress() as progress:
         effects = _effects(cars.cars[0], cars, trace, settings, progress, listed(strategies))
@@ -180,7 +184,6 @@ def _front(
     """The figures of a car's front, and the number of steps driven with less than the cycle asks."""
     from hevopt.case import require_nox
     from hevopt.pareto import GAP_ENOUGH, POINTS_MAX, figures_of, front
-    from hevopt.powertrain import build_problem
     from hevopt.rows import shortfall_steps
     from hevopt.strategies import strategy_named
 
@@ -188,7 +191,7 @@ def _front(
     if chosen.learns:
         raise DataError(f"--strategy {strategy} learns from other cycles; choose another, as dp")
     require_nox(car, "a front of fuel and NOx")
-    problem = build_problem(car, trace, allow_shortfall=settings.get("allow_shortfall", False))
+    problem = _problem(car, trace, settings)
     found = front(
         problem,
         weights,
@@ -198,6 +201,20 @@ def _front(
         progress=lambda text, done, total: progress(f"{car.name}: {text}", done, total),
     )
     return figures_of(found, car, trace, strategy), shortfall_steps(problem)
+
+
+def _problem(car: "Architecture", trace: "Cycle", settings: "Settings") -> "Problem":
+    """What a front is drawn on: the very table of the comparison's rows, so that none can lie beyond it."""
+    from hevopt.case import prepare
+    from hevopt.powertrain import build_problem
+
+    allow_shortfall = settings.get("allow_shortfall", False)
+    if not settings.get("refine", False):
+        return build_problem(car, trace, allow_shortfall=allow_shortfall)
+    weight = settings.get("nox_weight", 0.0)
+    return prepare(
+        car, trace, nox_weight=weight, allow_shortfall=allow_shortfall, refine=True
+    ).problem
 
 
 def _effects(
@@ -217,9 +234,14 @@ def _effects(
         strategies,
         nox_weight=settings.get("nox_weight", 0.0),
         allow_shortfall=settings.get("allow_shortfall", False),
+        refine=settings.get("refine", False),
         base={**cars.changes[car.name], **free},
         progress=progress,
     )
+
+
+def _with_refine(given: dict[str, Any], refine: bool | None) -> dict[str, Any]:
+    return given if refine is None else given | {"refine": refine}
 
 
 def _numbers(option: str, text: str) -> list[float]:

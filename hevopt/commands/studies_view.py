@@ -57,12 +57,16 @@ def front_table(figures: Mapping[str, Any]) -> Table:
     return table
 
 
-def front_notes(figures: Mapping[str, Any], car: Architecture, shortfall_steps: int) -> str:
+def front_notes(
+    figures: Mapping[str, Any], car: Architecture, shortfall_steps: int, *, refined: bool
+) -> str:
     """What the columns mean, and what the front as a whole says."""
     weights = [weight for point in figures["points"] for weight in point["nox_weights"]]
     short = ""
     if shortfall_steps:
         short = f"\nsteps driven with less than the cycle asks: {shortfall_steps}."
+    if refined:
+        short += "\nrefined: one table for all weights, torque levels added around the plan of least fuel."
     return f"""weight: kg of fuel that a kg of NOx counts, first to last of those for which no plan found is better.
 bound: no plan over the tabulated controls that ends with a state of charge of {car.soc_end:g} or more has less
 fuel + weight x NOx, as fuel volume. Each bound is a half plane of the diagram; no plan lies beyond any of them.
