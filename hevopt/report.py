@@ -13,7 +13,7 @@ from rich.text import Text
 from hevopt.files import printable
 from hevopt.problem import Plan, Problem
 from hevopt.published import published_beside
-from hevopt.rows import Row
+from hevopt.rows import Row, end_asked_text, marked
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison
 from hevopt.writing import write_whole
@@ -99,11 +99,8 @@ def comparison_notes(comparison: Comparison) -> str:
     objective = "fuel"
     if comparison.nox_weight:
         objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
-    reference = "nothing, every row failed"
-    if comparison.reference is not None:
-        reference = comparison.reference
     return (
-        f"vs ref: against {reference}. corrected: fuel less what the end charge is worth "
+        f"vs ref: against {_reference(comparison)}. corrected: fuel less what the end charge is worth "
         "(multiplier of the dual).\n"
         f"{_end_notes(comparison)}"
         f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
@@ -115,17 +112,22 @@ def comparison_notes(comparison: Comparison) -> str:
     )
 
 
+def _reference(comparison: Comparison) -> str:
+    """The row that the others are compared with, and what is to be known of it."""
+    for row in comparison.rows:
+        if f"{row.architecture} {row.strategy}" == comparison.reference:
+            return f"{comparison.reference}{marked(row.status)}"
+    return "nothing, every row failed"
+
+
 def _end_notes(comparison: Comparison) -> str:
     """What is asked of the end charge, where that is not the start's."""
     if not comparison.end_asked:
         return ""
-    cars: dict[float, list[str]] = {}
-    for car, soc in comparison.end_asked.items():
-        cars.setdefault(soc, []).append(printable(car))
-    asked = "; ".join(f"{soc:g} in {', '.join(names)}" for soc, names in cars.items())
     return (
-        f"end charge asked, other than the start's: {asked}. ΔE/fuel and corrected count only what is left beyond "
-        "it;\nelectricity drawn from the battery down to it (or stored up to it) is not counted as fuel, nor in "
+        f"end charge asked, other than the start's: {end_asked_text(comparison.end_asked)}. "
+        "ΔE/fuel and corrected count only what is left beyond it;\n"
+        "electricity drawn from the battery down to it (or stored up to it) is not counted as fuel, nor in "
         "vs ref.\n"
     )
 

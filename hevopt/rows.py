@@ -1,11 +1,13 @@
 """Rows: the figures of one architecture and strategy, made of a case and a trajectory, and their reference."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 from hevopt.architecture import Architecture
 from hevopt.case import Case
 from hevopt.certificate import SCOPE
 from hevopt.errors import HevoptError
+from hevopt.files import printable
 from hevopt.problem import Problem, Trajectory
 from hevopt.units import litres_per_100km
 
@@ -21,9 +23,9 @@ class Row:
     """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
     no reference, no fuel, or a bound of 0; of NOx also where the engine has no data on it.
 
-    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy; "end charge missed" where
-    another end charge than the start's is asked), "shortfall" (steps driven with less than the cycle asks), joined
-    by commas, or "failed: ..." with the reason
+    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy; where another end charge than
+    the start's is asked, "end charge missed" below it and "end charge above" beyond it), "shortfall" (steps driven
+    with less than the cycle asks), joined by commas, or "failed: ..." with the reason
     delta_energy_percent: stored energy at the end above what is asked, as a share of the fuel's;
     fuel_corrected_l_per_100km: fuel less what that energy is worth
     bound_l_per_100km: least of fuel + weighted NOx that any plan with this row's end charge could reach,
@@ -89,12 +91,15 @@ def failed_row(car: Architecture, strategy: str, error: HevoptError) -> Row:
 
 
 def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
-    """Rows with their change against the first good row of architecture A, or else of the table."""
+    """Rows with their change against a solved row of architecture A, or else of the table: the first that is ok,
+    or else the first.
+    """
     good = [row for row in rows if row.fuel_l_per_100km is not None]
     named = [row for row in good if row.architecture == REFERENCE_ARCHITECTURE]
     if not good:
         return rows, None
-    base = (named or good)[0]
+    candidates = named or good
+    base = next((row for row in candidates if row.status == "ok"), candidates[0])
 
     def change(value: float | None, reference: float | None) -> float | None:
         if value is None or reference is None or reference < _TINY:
@@ -114,12 +119,30 @@ def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
     return changed, f"{base.architecture} {base.strategy}"
 
 
+def end_asked_text(end_asked: Mapping[str, float]) -> str:
+    """The end charges asked, each with its cars: "0.5 in A, B; 0.58 in C2"."""
+    cars: dict[float, list[str]] = {}
+    for car, soc in end_asked.items():
+        cars.setdefault(soc, []).append(printable(car))
+    return "; ".join(f"{soc:g} in {', '.join(names)}" for soc, names in cars.items())
+
+
 def _status(problem: Problem, surplus_j: float, fuel_j: float) -> str:
     marks = []
-    if 100 * abs(surplus_j) > max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J):
-        neutral = problem.end_min_j == problem.start_j
-        marks.append("not neutral" if neutral else "end charge missed")
+    if not is_neutral(surplus_j, fuel_j):
+        missed = "end charge above" if surplus_j > 0 else "end charge missed"
+        marks.append("not neutral" if problem.end_min_j == problem.start_j else missed)
     return ", ".join(marks + shortfall_marks(problem)) or "ok"
+
+
+def is_neutral(surplus_j: float, fuel_j: float) -> bool:
+    """Whether the charge at the end is that asked, within 1 % of the fuel's energy."""
+    return 100 * abs(surplus_j) <= max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J)
+
+
+def marked(status: str) -> str:
+    """What to add to the name of a row that others are compared with: nothing, or its marks."""
+    return "" if status == "ok" else f", itself marked {status}"
 
 
 def shortfall_marks(problem: Problem) -> list[str]:

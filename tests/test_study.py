@@ -6,6 +6,7 @@ from conftest import ARCHITECTURES, CYCLES, HYBRIDS
 
 from hevopt import load_architecture, load_cycle, simulate
 from hevopt.demand import demand_of
+from hevopt.rows import Row, against_reference
 from hevopt.strategies import STRATEGIES, fitting
 
 
@@ -64,6 +65,29 @@ def test_every_row_is_neutral_or_flagged(comparison_of, cycle):
 
 def test_on_the_nedc_every_row_is_neutral(comparison_of):
     assert {row.status for row in comparison_of("nedc").rows} == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("statuses", "expected"),
+    [
+        ({"A first": "not neutral", "A second": "ok", "C2 third": "ok"}, "A second"),
+        ({"A first": "shortfall at 2 steps", "C2 second": "ok"}, "A first"),
+        ({"C2 first": "not neutral", "D second": "ok"}, "D second"),
+        ({"A first": "failed: no plan", "D second": "not neutral"}, "D second"),
+    ],
+)
+def test_the_reference_is_a_row_of_a_and_without_marks_where_there_is_one(statuses, expected):
+    rows = [
+        Row(*name.split(), status, fuel_l_per_100km=None if "failed" in status else 1.0 + n)
+        for n, (name, status) in enumerate(statuses.items())
+    ]
+    changed, reference = against_reference(rows)
+    assert reference == expected
+    assert [
+        row.delta_fuel_percent
+        for row in changed
+        if f"{row.architecture} {row.strategy}" == expected
+    ] == [0.0]
 
 
 @pytest.mark.parametrize("cycle", CYCLES)
