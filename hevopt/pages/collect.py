@@ -99,6 +99,7 @@ class Collector:
             reference=comparison.reference,
             nox_weight=comparison.nox_weight,
             free_gear=comparison.free_gear,
+            end_asked=dict(comparison.end_asked),
             command=command,
             changes=list(changes),
             inputs={

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+from hevopt.pages.alerts import alerts
 from hevopt.pages.page import render
 from hevopt.pages.results import Item, Results, Row, Sensitivity
-from hevopt.pages.verdict import alerts, best_rows, verdict
+from hevopt.pages.verdict import best_rows, charge_asked, reference_row, verdict
+from hevopt.rows import marked
 from hevopt.sensitivity import unsolved
 
 _J_PER_KWH = 3.6e6
@@ -24,6 +26,8 @@ def comparison_page(results: Results) -> str:
         title=f"Comparison on {results.cycle}",
         verdict=verdict(results),
         alerts=alerts(results),
+        reference=_reference(results),
+        charge_asked=charge_asked(results),
         table=[_figures(row) for row in results.rows],
         worth=[_worth(results, row) for row in results.rows if row.detail is not None],
         energy=[_Balance.of(results, row) for row in results.rows if row.detail is not None],
@@ -35,6 +39,12 @@ def comparison_page(results: Results) -> str:
         studied=", ".join(name for name, found in studies if found).capitalize(),
         left_out=_left_out(results),
     )
+
+
+def _reference(results: Results) -> str | None:
+    """The name of the row that all changes are against, and what is to be known of it."""
+    base = reference_row(results)
+    return None if base is None else f"{results.reference}{marked(base.status)}"
 
 
 def _left_out(results: Results) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from hevopt.datafile import FileModel
 
-FORMAT = "hevopt comparison 1"
+FORMAT = "hevopt comparison 2"
 
 
 class RowFigures(FileModel):
@@ -228,15 +228,17 @@ class Results(FileModel):
     """A comparison as it is saved.
 
     changes: what of the cars' files was changed, line by line
+    end_asked: car -> state of charge asked at the end, where it is another than the start's
     inputs: file -> SHA-256; versions: name -> version; failures: architecture, or it and strategy -> message
     """
 
-    format: Literal["hevopt comparison 1"] = FORMAT
+    format: Literal["hevopt comparison 2"] = FORMAT
     cycle: str
     distance_m: float
     reference: str | None
     nox_weight: float
     free_gear: bool
+    end_asked: dict[str, float]
     command: str
     changes: list[str]
     inputs: dict[str, str]

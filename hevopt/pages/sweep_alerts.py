@@ -6,10 +6,10 @@ from math import log
 
 import numpy as np
 
+from hevopt.pages.alerts import Alert
 from hevopt.pages.sweep_data import Figures, Scalar, Sweep
 from hevopt.pages.sweep_effects import is_log, is_numeric
 from hevopt.pages.sweep_verdict import GROUPS_MAX, Group, shown_value
-from hevopt.pages.verdict import Alert
 from hevopt.sweeps.jobs import NOX_WEIGHT
 
 LOOSE_PERCENT = 0.5
@@ -198,7 +198,7 @@ def _charge(sweep: Sweep) -> Alert:
     lines = [
         f"{count} case{'s' if count > 1 else ''}: {mark}." for mark, count in marks.most_common()
     ]
-    if "not neutral" in marks or "end charge missed" in marks:
+    if marks:
         lines.append("Designs are ranked by the charge-corrected objective.")
     nothing = "Every case ends with the charge asked, within 1 % of the fuel's energy."
     if not sweep.tally.strategies:

@@ -1,26 +1,15 @@
-"""What a comparison says in two sentences, and what a reader must know before believing it."""
+"""What a comparison says in two sentences."""
 
-from dataclasses import dataclass
+from hevopt.pages.page import fixed
+from hevopt.pages.results import Results, RowFigures
+from hevopt.rows import end_asked_text, marked
 
-from hevopt.pages.results import CarFigures, Results, RowFigures
-
-LOOSE_PERCENT = 0.2
 # Rows that differ by less than this are called equal.
 _EQUAL_PERCENT = 0.05
-_STEPS_LISTED = 5
-
-
-@dataclass(frozen=True, slots=True)
-class Alert:
-    """One thing to check: its name, whether there is something to say, and what, line by line.
-
-    grave: what puts figures in doubt, rather than what only deserves a look
-    """
-
-    name: str
-    found: bool
-    lines: list[str]
-    grave: bool = True
+_NOTHING_L_PER_100KM = 1e-9
+# No line ends between a number and its unit.
+_PERCENT = "\u00a0%"
+_VOLUME = "\u00a0l/100\u00a0km"
 
 
 def corrected_cost(row: RowFigures) -> float | None:
@@ -35,6 +24,21 @@ def cost(row: RowFigures) -> float:
     if row.bound_l_per_100km is None or row.gap_percent is None:
         return row.fuel_l_per_100km
     return row.bound_l_per_100km * (1 + row.gap_percent / 100)
+
+
+def is_nothing(row: RowFigures) -> bool:
+    """Whether a row's objective is 0, as on a trip driven on electricity alone."""
+    return cost(row) < _NOTHING_L_PER_100KM
+
+
+def reference_row(results: Results) -> RowFigures | None:
+    """The row that all changes are against."""
+    rows = (row.figures for row in results.rows)
+    return next((row for row in rows if _name(row) == results.reference), None)
+
+
+def _name(row: RowFigures) -> str:
+    return f"{row.architecture} {row.strategy}"
 
 
 def best_rows(results: Results) -> list[RowFigures]:
@@ -52,135 +56,92 @@ def best_rows(results: Results) -> list[RowFigures]:
 
 
 def verdict(results: Results) -> list[str]:
-    """Two sentences: the best row and what it saves; how close it is to the proven bound."""
+    """Two sentences: the best row and what it saves; how close it is to the proven bound.
+
+    A third where another end charge than the start's is asked.
+    """
     equal = best_rows(results)
     if not equal:
         return ["No case could be solved on this cycle.", "The reasons are listed below."]
-    return [_first(results, equal[0], equal[1:]), _second(results, equal[0])]
+    return [
+        _first(results, equal[0], equal[1:]),
+        _second(results, equal[0]),
+        *charge_asked(results),
+    ]
 
 
 def _first(results: Results, best: RowFigures, equal: list[RowFigures]) -> str:
-    what, sum_of = "fuel", ""
+    what, volume = "fuel", _VOLUME
     if results.nox_weight:
         what = f"fuel plus {results.nox_weight:g} times NOx"
-        sum_of = f"{cost(best):.4f} l/100 km as fuel volume, of which fuel "
-    others = ", ".join(f"{row.architecture} {row.strategy}" for row in equal)
-    also = f" (equal within {_EQUAL_PERCENT:g} %: {others})" if others else ""
-    change = ""
-    if f"{best.architecture} {best.strategy}" == results.reference:
-        change = ", itself the reference of all changes"
-    elif best.delta_fuel_percent is not None:
-        less = "less" if best.delta_fuel_percent <= 0 else "more"
-        change = f", {abs(best.delta_fuel_percent):.1f} % {less} than {results.reference}"
+        volume = f"{_VOLUME} as fuel volume"
+    others = ", ".join(map(_name, equal))
+    also = f" (equal within {_EQUAL_PERCENT:g}{_PERCENT}: {others})" if others else ""
     doubt = "" if best.status == "ok" else "; no row is free of alerts, see below"
-    known = best.nox_mg_per_km is not None
-    nox = f"{best.nox_mg_per_km:.0f} mg NOx/km" if known else "NOx unknown"
     return (
-        f"On {results.cycle}, {best.architecture} with {best.strategy} needs the least {what}{also}: {sum_of}"
-        f"{best.fuel_l_per_100km:.4f} l/100 km ({best.co2_g_per_km:.1f} g CO2/km, {nox}){change}{doubt}."
+        f"On {results.cycle}, {best.architecture} with {best.strategy} needs the least {what}{also}: "
+        f"{corrected_cost(best):.4f}{volume}, charge-corrected ({_as_driven(results, best)})"
+        f"{_change(results, best)}{doubt}."
+    )
+
+
+def _as_driven(results: Results, row: RowFigures) -> str:
+    """Fuel, CO2 and NOx of a row; with a weight on NOx, their own changes, which are not the sum's."""
+
+    def own(percent: float | None) -> str:
+        shown = results.nox_weight and percent is not None and _name(row) != results.reference
+        return f" ({fixed(percent, '+.1f')}{_PERCENT})" if shown else ""
+
+    nox = "NOx unknown"
+    if row.nox_mg_per_km is not None:
+        nox = f"{row.nox_mg_per_km:.0f}\u00a0mg NOx/km{own(row.delta_nox_percent)}"
+    return (
+        f"as driven: fuel {row.fuel_l_per_100km:.4f}{_VOLUME}{own(row.delta_fuel_percent)}, "
+        f"{row.co2_g_per_km:.1f}\u00a0g CO2/km, {nox}"
+    )
+
+
+def _change(results: Results, best: RowFigures) -> str:
+    """The change of what is ranked, against the reference."""
+    base = reference_row(results)
+    if base is None or base.fuel_l_per_100km is None:
+        return ""
+    if base is best:
+        return ", itself the reference of all changes"
+    summed = best.gap_percent is not None and base.gap_percent is not None
+    whole = corrected_cost(base)
+    if whole < _NOTHING_L_PER_100KM or (results.nox_weight and not summed):
+        return ""
+    percent = 100 * (corrected_cost(best) / whole - 1)
+    less = "less" if percent <= 0 else "more"
+    return (
+        f", {abs(percent):.1f}{_PERCENT} {less} than {results.reference}{marked(base.status)} "
+        "(both charge-corrected)"
     )
 
 
 def _second(results: Results, best: RowFigures) -> str:
     if best.gap_percent is None:
-        return "There is no bound to hold it against."
+        if best.bound_l_per_100km is None:
+            return "There is no bound to hold it against."
+        if is_nothing(best):
+            return "It cannot be lower: nothing is burnt, and 0 is the bound."
+        return "The proven lower bound is 0: how close to it the row could come is not known."
     proof = (best.certificate or "").split(",")[0]
     sum_of = " of that sum" if results.nox_weight else ""
     return (
-        f"It lies {max(best.gap_percent, 0.0):.3f} % above a proven lower bound ({proof}): no use of engine, "
-        f"machine and gears among the tabulated controls takes {best.architecture} below "
-        f"{best.bound_l_per_100km:.4f} l/100 km{sum_of} with the same charge at the end."
+        f"As driven it lies {max(best.gap_percent, 0.0):.3f}{_PERCENT} above a proven lower bound ({proof}): no "
+        f"use of engine, machine and gears among the tabulated controls takes {best.architecture} below "
+        f"{best.bound_l_per_100km:.4f}{_VOLUME}{sum_of} with the same charge at the end."
     )
 
 
-def alerts(results: Results) -> list[Alert]:
-    """The five checks, in the order of a reader's doubts; each speaks also where there is nothing to say."""
-    return [_steps(results), _neutral(results), _limits(results), _loose(results), _solver(results)]
-
-
-def _steps(results: Results) -> Alert:
-    lines = [
-        line for name, car in results.cars.items() if (line := _missing(name, car)) is not None
+def charge_asked(results: Results) -> list[str]:
+    """What an asked end charge other than the start's means for the figures; nothing where none is asked."""
+    if not results.end_asked:
+        return []
+    return [
+        f"The state of charge asked at the end is not the start's: {end_asked_text(results.end_asked)}; "
+        "electricity drawn from the battery down to it, or stored up to it, is not counted as fuel, nor in "
+        "any change."
     ]
-    unsolved = dict.fromkeys(
-        row.figures.architecture
-        for row in results.rows
-        if row.figures.architecture not in results.cars
-    )
-    lines += [f"{name}: no result; see Solvers." for name in unsolved]
-    return Alert("Steps not followed", bool(lines), lines or ["Every car follows every step."])
-
-
-def _missing(name: str, car: CarFigures) -> str | None:
-    short = [(t, nm) for t, nm in zip(car.time_s, car.missing_torque_nm, strict=True) if nm > 0]
-    if not short:
-        return None
-    at = ", ".join(f"{t:g} s" for t, _ in short[:_STEPS_LISTED])
-    more = f" and {len(short) - _STEPS_LISTED} more" if len(short) > _STEPS_LISTED else ""
-    return (
-        f"{name}: {len(short)} of {len(car.time_s)} steps, up to {max(nm for _, nm in short):.0f} Nm short at "
-        f"the wheels (at {at}{more}); driven with what there is."
-    )
-
-
-def _neutral(results: Results) -> Alert:
-    lines = []
-    for row in (row.figures for row in results.rows if "not neutral" in row.figures.status):
-        share = "while no fuel is burnt"
-        if row.delta_energy_percent is not None:
-            change = f"{row.delta_energy_percent:+.2f} %".replace("-", "−")
-            share = f"by {change} of the fuel's energy"
-        lines.append(
-            f"{row.architecture} {row.strategy}: stored energy changes {share}; compare the corrected figure."
-        )
-    nothing = "Every row that was solved ends with its charge within 1 % of the fuel's energy."
-    return Alert("Charge balance", bool(lines), lines or [nothing])
-
-
-def _limits(results: Results) -> Alert:
-    found: dict[tuple[str, str], list[str]] = {}
-    for row in results.rows:
-        for name, steps in (row.detail.limits if row.detail else {}).items():
-            words = found.setdefault((row.figures.architecture, name), [])
-            words.append(f"{steps} ({row.figures.strategy})")
-    lines = [f"{car}, {name}: steps {', '.join(words)}." for (car, name), words in found.items()]
-    nothing = (
-        "No row comes within 1 % of full load, an edge of a map or a limit of machine and battery."
-    )
-    head = ["Steps within 1 % of a limit, where more of the component could change the result:"]
-    return Alert(
-        "Map edges and limits", bool(lines), head + lines if lines else [nothing], grave=False
-    )
-
-
-def _loose(results: Results) -> Alert:
-    gaps = {name: car.certified_gap_percent for name, car in results.cars.items()}
-    lines = [
-        f"{name}: dynamic programming lies {gap:.2f} % above the bound; how much of it is slack is not known."
-        for name, gap in gaps.items()
-        if gap is not None and gap > LOOSE_PERCENT
-    ]
-    known = {name: gap for name, gap in gaps.items() if gap is not None}
-    widest = max(known, key=known.get, default=None)
-    tight = "There is no certificate."
-    if widest is not None:
-        tight = (
-            f"Optimum and bound are at most {max(known[widest], 0.0):.3f} % apart ({widest}); "
-            f"loose would be {LOOSE_PERCENT:g} %."
-        )
-    return Alert("Certificates", bool(lines), lines or [tight])
-
-
-def _solver(results: Results) -> Alert:
-    lines = [
-        line
-        for name, message in results.failures.items()
-        for line in f"{name}: {message}".splitlines()
-    ]
-    lines += [
-        f"{row.figures.architecture} {row.figures.strategy}: {trouble}."
-        for row in results.rows
-        if row.detail is not None
-        for trouble in row.detail.solver
-    ]
-    return Alert("Solvers", bool(lines), lines or ["Every case was solved, none with a warning."])

@@ -53,7 +53,7 @@ def _changed(nedc, change):
         (lambda nedc: b"\x1f\x8bnothing", "neither JSON"),
         (lambda nedc: nedc.results.packed()[:-1000], "cut short"),
         (lambda nedc: b"[" * 100_000, "neither JSON"),
-        (lambda nedc: b'{"cycle": "nedc", "rows": []}', "hevopt comparison 1"),
+        (lambda nedc: b'{"cycle": "nedc", "rows": []}', "hevopt comparison 2"),
         (lambda nedc: b"\xff\xfe\x00", "neither JSON"),
         (lambda nedc: _changed(nedc, lambda c: c.pop("cars")), "cars: field required"),
         (lambda nedc: _changed(nedc, lambda c: c.update(more=1)), "more: extra"),
