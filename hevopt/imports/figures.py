@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from hevopt.engine_file import EngineFile
 from hevopt.imports.coastdown import RoadLoad, Run
-from hevopt.imports.map_envelope import Envelope, envelope_of
+from hevopt.imports.map_envelope import Envelope, accepted, envelope_of
 from hevopt.imports.map_gaps import WIDE, lowest_fired_nm, widest_gap
 from hevopt.imports.map_import import Imported
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
@@ -17,19 +18,26 @@ from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Array = NDArray[np.float64]
+
 _DPI = 110
+# Cells of the plot along each axis, finer than its pixels are wide.
+_CELLS = 500
 _COLOURS = {1: "#0b6e99", -1: "#c2571a"}
 
 
 def map_figure(imported: Imported) -> bytes:
-    """Coverage of a map: cells known, measured points, limits, and efficiency as contours."""
+    """Coverage of a map: what a car can use, measured points, limits, and efficiency as contours."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
-    grid, file = imported.grid, imported.file
-    rpm, torque = grid.speed_radps * RPM_PER_RADPS, grid.torque_nm
-    known = np.ma.masked_where(np.isnan(grid.values), np.ones_like(grid.values))
-    axes.pcolormesh(rpm, torque, known.T, cmap="Greens", vmin=0, vmax=3, shading="nearest")
-    _efficiency_contours(axes, imported)
+    file = imported.file
+    speed, torque, usable = covered_mesh(imported)
+    ends = [e * RPM_PER_RADPS for e in (speed[0, 0], speed[-1, 0])] + [torque[0, 0], torque[0, -1]]
+    axes.imshow(
+        np.where(usable, 1.0, np.nan).T, cmap="Greens", vmin=0, vmax=3, origin="lower", aspect="auto",
+        extent=ends, interpolation="nearest",
+    )  # fmt: skip
+    _efficiency_contours(axes, imported, speed, torque, usable)
     points = imported.lines.points
     axes.plot(
         points.speed_radps * RPM_PER_RADPS, points.torque_nm, ".", color="#444444", markersize=3,
@@ -66,27 +74,37 @@ def _doubts(axes: "Axes", imported: Imported, envelope: Envelope) -> None:
         )  # fmt: skip
 
 
-def _efficiency_contours(axes: "Axes", imported: Imported) -> None:
-    grid, file = imported.grid, imported.file
-    speed, torque = np.meshgrid(grid.speed_radps, grid.torque_nm, indexing="ij")
+def covered_mesh(imported: Imported) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """(speed, torque) centres of the plot's cells over the map and the limits, and which are usable."""
+    grid, envelope = imported.grid, envelope_of(imported.file)
+    low = min(grid.torque_nm[0], envelope.low_nm.min())
+    high = max(grid.torque_nm[-1], envelope.high_nm.max())
+    speeds = grid.speed_radps[0], grid.speed_radps[-1]
+    shares = (np.arange(_CELLS) + 0.5) / _CELLS
+    axis = [a + shares * (b - a) for a, b in (speeds, (low, high))]
+    speed, torque = np.meshgrid(*axis, indexing="ij")
+    return speed, torque, accepted(imported, speed, torque)
+
+
+def _efficiency_contours(
+    axes: "Axes", imported: Imported, speed: Array, torque: Array, usable: NDArray[np.bool_]
+) -> None:
+    flow, file = imported.grid.at(torque, speed), imported.file
     power = np.where(torque * speed == 0, np.nan, np.abs(torque * speed))
     with np.errstate(invalid="ignore", divide="ignore"):
         if isinstance(file, EngineFile):
-            heat = grid.values * file.fuel.heating_value_mjpkg * 1e6
+            heat = flow * file.fuel.heating_value_mjpkg * 1e6
             efficiency = np.where((torque > 0) & (heat > 0), power / heat, np.nan)
         else:
-            efficiency = np.where(
-                torque > 0, power / (power + grid.values), 1 - grid.values / power
-            )
-    shown = np.ma.masked_invalid(efficiency)
-    if shown.count() < 4 or min(shown.shape) < 2:
+            efficiency = np.where(torque > 0, power / (power + flow), 1 - flow / power)
+    shown = np.ma.masked_invalid(np.where(usable, efficiency, np.nan))
+    if not shown.count():
         return
     top = float(shown.max())
     levels = [top * share for share in (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)]
     contours = axes.contour(
-        grid.speed_radps * RPM_PER_RADPS, grid.torque_nm, shown.T, levels=levels,
-        colors="#1b5e20", linewidths=0.8,
-    )  # fmt: skip
+        speed * RPM_PER_RADPS, torque, shown, levels=levels, colors="#1b5e20", linewidths=0.8
+    )
     axes.clabel(contours, fmt=lambda value: f"{value:.0%}", fontsize=8)
 
 

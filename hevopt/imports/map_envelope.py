@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hevopt.engine_file import EngineFile
 from hevopt.imports.map_grid import Grid
+from hevopt.imports.map_import import Imported
 from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
@@ -24,14 +25,24 @@ class Envelope:
     high_nm: Array
 
 
-def envelope_of(file: EngineFile | MachineFile, count: int = FINE) -> Envelope:
-    """Torques between which the car may use the component: motoring and full load, or a machine's limits."""
-    if isinstance(file, EngineFile):
+def envelope_of(file: EngineFile | MachineFile, speed_radps: Array | None = None) -> Envelope:
+    """Torques between which the car may use the component: motoring and full load, or a machine's limits.
+
+    speed_radps: where, else evenly over all speeds of the component; NaN at other speeds than its own
+    """
+    engine = isinstance(file, EngineFile)
+    low_rpm, high_rpm = (
+        (file.idle_rpm, file.full_load.speed_rpm[-1]) if engine else (0.0, file.speed_max_rpm)
+    )
+    rpm = np.linspace(low_rpm, high_rpm, FINE)
+    if speed_radps is not None:
+        rpm = speed_radps * RPM_PER_RADPS
+        rpm = np.where((rpm < low_rpm) | (rpm > high_rpm), np.nan, rpm)
+    speed = rpm / RPM_PER_RADPS
+    if engine:
         full, grid = file.full_load, file.fuel_map
-        rpm = np.linspace(file.idle_rpm, full.speed_rpm[-1], count)
         low = np.interp(rpm, grid.speed_rpm, grid.motoring_torque_nm)
-        return Envelope(rpm / RPM_PER_RADPS, low, np.interp(rpm, full.speed_rpm, full.torque_nm))
-    speed = np.linspace(0.0, file.speed_max_rpm, count) / RPM_PER_RADPS
+        return Envelope(speed, low, np.interp(rpm, full.speed_rpm, full.torque_nm))
     with np.errstate(divide="ignore"):
         high = np.minimum(file.torque_max_nm, file.power_max_w / speed)
     return Envelope(speed, -high, high)
@@ -42,6 +53,15 @@ def between(grid: Grid, envelope: Envelope) -> tuple[Array, NDArray[np.bool_]]:
     shares = np.linspace(0.0, 1.0, FINE)
     torque = envelope.low_nm[:, None] * (1 - shares) + envelope.high_nm[:, None] * shares
     return torque, ~np.isnan(grid.at(torque, envelope.speed_radps[:, None]))
+
+
+def accepted(imported: Imported, speed_radps: Array, torque_nm: Array) -> NDArray[np.bool_]:
+    """Where a car may use the component: within its limits, and all that the file holds a map of is known."""
+    envelope = envelope_of(imported.file, speed_radps)
+    inside = (torque_nm >= envelope.low_nm) & (torque_nm <= envelope.high_nm)
+    for grid in (imported.grid, *(imported.nox or ())[:1]):
+        inside &= ~np.isnan(grid.at(torque_nm, speed_radps))
+    return inside
 
 
 def mesh(grid: Grid) -> tuple[Array, Array]:

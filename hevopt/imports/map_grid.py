@@ -189,18 +189,22 @@ def on_axes(lines: Lines, speed_radps: Array, torque_nm: Array) -> Grid:
     return Grid(speed_radps, torque_nm, _on_triangles(lines, speed_radps, torque_nm))
 
 
-def envelope_nm(lines: Lines, sign: float = 1.0) -> tuple[Array, Array]:
-    """Speeds, and the outermost torque measured there: highest with sign 1, lowest with -1.
-
-    Without speed lines: over a twentieth of the speed range each.
-    """
+def groups(lines: Lines) -> tuple[NDArray[np.int64], Array]:
+    """Group of each point and the groups' speeds: the speed lines, else twentieths of the speed range."""
     line, speed = lines.line, lines.speed_radps
-    if not lines.regular:
-        edges = np.linspace(speed[0], speed[-1], 21)
-        line = np.clip(np.searchsorted(edges, speed[line], "right") - 1, 0, 19)
-        used, line = np.unique(line, return_inverse=True)
-        speed = ((edges[1:] + edges[:-1]) / 2)[used]
-        speed[0], speed[-1] = edges[0], edges[-1]
+    if lines.regular:
+        return line, speed
+    edges = np.linspace(speed[0], speed[-1], 21)
+    line = np.clip(np.searchsorted(edges, speed[line], "right") - 1, 0, 19)
+    used, line = np.unique(line, return_inverse=True)
+    speed = ((edges[1:] + edges[:-1]) / 2)[used]
+    speed[0], speed[-1] = edges[0], edges[-1]
+    return line, speed
+
+
+def envelope_nm(lines: Lines, sign: float = 1.0) -> tuple[Array, Array]:
+    """Speeds, and the outermost torque measured around each: highest with sign 1, lowest with -1."""
+    line, speed = groups(lines)
     outermost = np.full(len(speed), -np.inf)
     np.maximum.at(outermost, line, sign * lines.points.torque_nm)
     return speed, sign * outermost

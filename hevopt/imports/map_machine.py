@@ -1,7 +1,4 @@
-"""A machine component from a measured map: the loss of machine and inverter on a grid of speed and torque.
-
-At rest without torque the inverter is off, which is the one point added to those measured.
-"""
+"""A machine component from a measured map: the loss of machine and inverter on a grid of speed and torque."""
 
 from typing import Any
 
@@ -19,9 +16,13 @@ from hevopt.imports.map_import import (
     with_given,
 )
 from hevopt.imports.map_limits import cell_at, near
-from hevopt.imports.map_points import Curve, EngineFacts, read_curve, read_points
+from hevopt.imports.map_points import Curve, EngineFacts, Points, read_curve, read_points
+from hevopt.imports.map_rest import with_no_load, with_rest
+from hevopt.imports.measured_rows import runs
 from hevopt.machine_file import MachineFile
-from hevopt.units import RPM_PER_RADPS
+
+# Below this share of the largest power a machine may well lose more than it generates.
+_SENSIBLE = 0.1
 
 
 def import_machine(request: Request) -> Imported:
@@ -42,15 +43,21 @@ def import_machine(request: Request) -> Imported:
     if "full" in request.extra:
         limit = read_curve(request.extra["full"], "full", EngineFacts(None, None, None), plain=True)
     check_used(request, points.roles | (limit.roles if limit is not None else frozenset()))
-    lines = in_lines(points, proportional=False)
+    _check_generating(request, points)
+    measured = in_lines(points, proportional=False)
+    symmetric = bool(measured.points.torque_nm.min() >= 0)
+    lines, assumed = with_no_load(measured)
     axes = axes_of(lines)
     if axes.torque_nm[-1] <= 0:
         raise DataError(
             f"{request.source.path.name}: no torque above 0; a map needs motoring points"
         )
-    symmetric = bool(axes.torque_nm[0] >= 0)
-    grid, added = _with_rest(on_axes(lines, axes.speed_radps, axes.torque_nm), symmetric)
-    notes = [*points.notes, *lines.notes, axes.rule, *added]
+    grid, added = with_rest(on_axes(lines, axes.speed_radps, axes.torque_nm), bool(assumed))
+    notes = [*points.notes, *lines.notes, axes.rule, *assumed, *added]
+    if symmetric:
+        notes.append(
+            "no torque below 0: ASSUMED that generating loses what motoring does at equal torque"
+        )
     power = np.abs(lines.points.torque_nm * lines.points.speed_radps)
     torque, top_radps, whence = np.abs(lines.points.torque_nm), lines.speed_radps[-1], "the points"
     if limit is not None:
@@ -81,7 +88,7 @@ def import_machine(request: Request) -> Imported:
         }
     }
     file = checked(f"component from {request.source.path.name}", contents, MachineFile)
-    return Imported(contents, file, origins, tuple(notes), _both_signs(grid), lines)
+    return Imported(contents, file, origins, tuple(notes), _both_signs(grid), measured)
 
 
 def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
@@ -103,38 +110,20 @@ def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
     ]
 
 
-def _with_rest(grid: Grid, symmetric: bool) -> tuple[Grid, list[str]]:
-    """The grid with torque 0 at every speed, and with standstill, where without torque nothing is lost."""
-    speed, torque, values = grid.speed_radps, grid.torque_nm, grid.values
-    notes = []
-    if symmetric:
-        notes.append(
-            "no torque below 0: ASSUMED that generating loses what motoring does at equal torque"
+def _check_generating(request: Request, points: Points) -> None:
+    """DataError where electric power was written without the sign that it has while the machine generates."""
+    power = points.torque_nm * points.speed_radps
+    generating = power < -_SENSIBLE * np.abs(power).max()
+    if "electric" not in points.roles or not generating.any():
+        return
+    wrong = generating & (points.value >= -power)
+    if 2 * wrong.sum() > generating.sum():
+        lines = runs(sorted(set(points.lines[wrong].tolist())))
+        raise DataError(
+            f"{request.source.path.name}, {lines}: electric power takes more than the shaft gives at {wrong.sum()} "
+            f"of {generating.sum()} generating points (torque below 0); electric power is negative while "
+            "generating; turn its sign there"
         )
-    if not (torque == 0).any():
-        at = int(np.searchsorted(torque, 0.0))
-        beside = values[:, [0, 0]] if at == 0 else values[:, at - 1 : at + 1]
-        part = 0.0 if at == 0 else -torque[at - 1] / (torque[at] - torque[at - 1])
-        torque = np.insert(torque, at, 0.0)
-        values = np.insert(values, at, beside @ [1 - part, part], axis=1)
-        notes.append("loss at torque 0: not measured, linear between the torques beside it")
-    if speed[0] > 0:
-        speed, values = np.insert(speed, 0, 0.0), np.vstack([np.full(len(torque), np.nan), values])
-        notes.append(
-            f"below {speed[1] * RPM_PER_RADPS:.4g} rpm: torque 0 alone can be used, its loss falling to 0 at rest; "
-            "to drive off electrically, add points at lower speed (with a column of loss at standstill)"
-        )
-    zero = int(np.flatnonzero(torque == 0)[0])
-    if np.isnan(values[0, zero]):
-        values[0, zero] = 0.0
-    known = ~np.isnan(values[:, zero])
-    gaps = ~known & (speed < speed[known][-1])
-    if gaps.any():
-        values[gaps, zero] = np.interp(speed[gaps], speed[known], values[known, zero])
-        notes.append(
-            f"loss at torque 0: linear in speed at {rpm_list(speed[gaps])} rpm, where it is not measured"
-        )
-    return Grid(speed, torque, values), notes
 
 
 def _both_signs(grid: Grid) -> Grid:

@@ -167,10 +167,12 @@ def _value(table: Table, role: str, what: str, torque_nm: Array, facts: EngineFa
         return values * _known(
             table, facts.fuel_density_kgpm3, "a volume flow", "fuel.density_kgpl"
         )
-    if (values[np.isfinite(values)] > 1).any():
+    if (values > 1).any():
+        read = next(note for note in table.notes if note.startswith("efficiency: "))
         raise DataError(
-            f"{table.measured.path}: efficiency up to {np.nanmax(values):g}; allowed: up to 1; where it is in "
-            "per cent, say so in the header, or with --unit efficiency=%"
+            f"{table.measured.path}, {_places(table, values > 1)}: efficiency up to {np.nanmax(values):g}; "
+            f"allowed: up to 1, which is 100 %; read as {read}; correct the cells, or give the unit in the header "
+            "or with --unit efficiency=UNIT"
         )
     efficiency = np.where(values > 0, values, np.nan)
     if what == "loss":

@@ -166,3 +166,31 @@ def test_a_hole_is_said_to_be_filled_only_where_it_is(hevopt):
     # Holes amid the map are named before those at its edge.
     at = float(seen.out.split("holes: ")[1].split(": ")[1].split(" rpm")[0])
     assert 1600 < at < 2900
+
+
+def test_the_plot_colours_what_a_car_can_use_and_nothing_else(hevopt):
+    from matplotlib.image import imread
+
+    rpm, torque, fuel, nox = bench(full=False).T
+    fuel[(rpm == 2000) & (torque > 90) & (torque < 160)] = np.nan
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h],NOx [g/h]", rpm, torque, fuel, nox)
+    write_curves()
+    assert hevopt(*IMPORT, *CURVES).status == 0
+    engine = imported_engine()
+    picture = imread("b.png")[..., :3]
+    # The frame of the axes is black, and spans the full-load curve and the map with a margin of 5 %.
+    dark = picture.max(axis=2) < 0.1
+    columns, rows = np.flatnonzero(dark.mean(axis=0) > 0.8), np.flatnonzero(dark.mean(axis=1) > 0.8)
+    left, right, top, bottom = columns[0], columns[-1], rows[0], rows[-1]
+    green = np.abs(picture - picture[bottom - 60, right - 60]).max(axis=2) < 0.02
+    column, row = (np.arange(a, b) for a, b in ((left + 2, right), (top + 2, bottom)))
+    low, high = engine.fuel.torque_nm[0], 290.0
+    speed = 850 + 4150 * ((column + 0.5 - left) / (right + 1 - left) * 1.1 - 0.05)
+    load = low + (high - low) * ((bottom + 0.5 - row) / (bottom + 1 - top) * 1.1 - 0.05)
+    speed, load = np.meshgrid(speed * RPM, load)
+    flow = engine_model.fuel_kgps(engine, load, speed) + engine_model.nox_kgps(engine, load, speed)
+    usable = ~np.isnan(flow) & (load <= engine_model.full_load_torque_nm(engine, speed))
+    usable &= (load >= engine_model.drag_torque_nm(engine, speed)) & (speed <= SPEED[-1])
+    shown = green[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
+    # Points, lines and hatches are drawn over the colour, and edges fall within pixels.
+    assert (shown & ~usable).mean() < 0.005 and (usable & ~shown).mean() < 0.1

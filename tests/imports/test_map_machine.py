@@ -1,0 +1,74 @@
+"""What `hevopt maps import` makes of a machine's points, against the formula that they were sampled from."""
+
+import numpy as np
+import pytest
+from map_bench import RPM, car_with, write
+
+from hevopt import load_architecture
+from hevopt import machine as machine_model
+
+MACHINE = load_architecture("C2").machine
+LIKE = ("--like", "machine_flywheel_18kw")
+IMPORT = ("maps", "import", "m.csv", "--kind", "machine", *LIKE)
+SPEEDS = (250, 500, 1000, 1500, 2000, 2500, 3000, 4000, 5000, 6000)
+
+
+def bench(signs=(1, -1)) -> tuple[np.ndarray, ...]:
+    """rpm, Nm, shaft power and loss at shares of the limit, as a bench without a no-load test measures them."""
+    rpm = np.repeat(SPEEDS, 7)
+    torque = machine_model.torque_limit_nm(MACHINE, rpm * RPM)
+    torque = torque * np.tile([0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0], len(SPEEDS))
+    rpm, torque = np.tile(rpm, len(signs)), np.concatenate([sign * torque for sign in signs])
+    return rpm, torque, rpm * RPM * torque, machine_model.loss_w(MACHINE, torque, rpm * RPM)
+
+
+@pytest.mark.parametrize("signs", [(1,), (1, -1)])
+def test_the_loss_without_torque_is_assumed_near_the_truth_and_leaves_no_band(hevopt, signs):
+    rpm, torque, power, loss = bench(signs)
+    efficiency = np.where(power > 0, power / (power + loss), (power + loss) / power)
+    write("m.csv", "speed [rpm],torque [Nm],efficiency [%]", rpm, torque, 100 * efficiency)
+    seen = hevopt(*IMPORT)
+    assert seen.status == 0, seen
+    assert (
+        "not measured at 10 of 10 speeds (250 to 6000 rpm); ASSUMED to be that of the" in seen.out
+    )
+    machine = load_architecture(car_with("machine", "m.toml")).machine
+    speed, share = np.meshgrid(np.linspace(250, 6000, 116) * RPM, np.linspace(-0.12, 0.12, 41))
+    load = share * machine_model.torque_limit_nm(MACHINE, speed)
+    found = machine_model.loss_w(machine, load, speed)
+    assert not np.isnan(found).any()
+    truth = machine_model.loss_w(MACHINE, load, speed)
+    # The loss at the lowest torque measured is 7 W above that at 0; the rest is the bend over speed.
+    assert np.abs(found - truth).max() < 25 and np.abs(found - truth).mean() < 8
+
+
+def test_a_measured_loss_without_torque_is_kept(hevopt):
+    rpm, torque, _, loss = bench()
+    still = machine_model.loss_w(MACHINE, np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
+    columns = [*rpm, *SPEEDS], [*torque, *(0.0 for _ in SPEEDS)], [*loss, *still]
+    write("m.csv", "speed [rpm],torque [Nm],loss [W]", *columns)
+    seen = hevopt(*IMPORT)
+    assert seen.status == 0 and "ASSUMED" not in seen.out, seen
+    machine = load_architecture(car_with("machine", "m.toml")).machine
+    found = machine_model.loss_w(machine, np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
+    np.testing.assert_allclose(found, still, rtol=1e-6)
+
+
+def test_electric_power_without_its_sign_while_generating_is_refused(hevopt):
+    rpm, torque, power, loss = bench()
+    write("m.csv", "speed [rpm],torque [Nm],electric power [W]", rpm, torque, abs(power + loss))
+    seen = hevopt(*IMPORT)
+    assert seen.status == 2 and "electric power is negative while generating" in seen.err, seen
+    assert "m.csv, lines 7" in seen.err and seen.out == ""
+    write("m.csv", "speed [rpm],torque [Nm],electric power [W]", rpm, torque, power + loss)
+    assert hevopt(*IMPORT).status == 0
+
+
+def test_efficiency_above_all_is_named_with_its_line_and_how_it_was_read(hevopt):
+    rpm, torque, power, loss = bench((1,))
+    efficiency = 100 * power / (power + loss)
+    efficiency[4] = 104
+    write("m.csv", "speed [rpm],torque [Nm],efficiency [%]", rpm, torque, efficiency)
+    seen = hevopt(*IMPORT)
+    assert seen.status == 2 and "line 6: efficiency up to 1.04; allowed: up to 1" in seen.err, seen
+    assert "efficiency [%] in % (header)" in seen.err
