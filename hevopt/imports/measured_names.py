@@ -56,7 +56,7 @@ def unit_in_name(name: str) -> tuple[str | None, str]:
             return match[3], "header"
     if suffix := _suffix(name):
         return suffix[1], "suffix of the name"
-    if len(name) > 2 and name.lower() != "min" and unit_named(name):
+    if len(name) > 1 and name.lower() != "min" and unit_named(name):
         return name, "the name is a unit"
     return None, ""
 

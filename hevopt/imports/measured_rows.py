@@ -133,7 +133,12 @@ def _header(
     above = [(line, _padded(cells, width)) for line, cells in head[:start]]
     above = [row if len(row[1]) == width else None for row in above]
     units, used = None, 0
-    if len(above) > 1 and above[-1] and above[-2] and (units := _units_row(above[-1][1])):
+    if (
+        len(above) > 1
+        and above[-1]
+        and above[-2]
+        and (units := _units_row(above[-1][1], above[-2][1]))
+    ):
         used = 1
     if len(above) <= used or above[-1 - used] is None:
         return [f"column {i + 1}" for i in range(width)], None, 0, ["no header: columns by number"]
@@ -149,11 +154,23 @@ def _padded(cells: list[str], width: int) -> list[str]:
     return cells + [""] * (width - len(cells)) if width - 2 <= len(cells) < width else cells
 
 
-def _units_row(cells: list[str]) -> list[str] | None:
+def _units_row(cells: list[str], names: list[str]) -> list[str] | None:
+    """Units by column where the cells below some names are such; None where they are no units row.
+
+    One that no table knows, such as degC, is kept: it matters only where its column is used.
+    """
     units = [unit_in_cell(cell) for cell in cells]
-    if None in units or not any(unit and unit != "1" and unit_named(unit) for unit in units):
+    if not any(unit and unit != "1" and unit_named(unit) for unit in units):
         return None
-    return units
+    strange = units.count(None)
+    if not strange:
+        return units
+    filled = [name for name, cell in zip(names, cells, strict=True) if cell]
+    # Titles over groups of columns are no names: they repeat, or leave columns blank.
+    named = all(filled) and len(set(filled)) == len(filled) and not any(map(is_value, names))
+    if not named or 2 * strange > len(filled) or any(map(is_value, cells)):
+        return None
+    return [cell if unit is None else unit for unit, cell in zip(units, cells, strict=True)]
 
 
 def _read(

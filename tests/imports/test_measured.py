@@ -343,3 +343,31 @@ def test_a_time_of_day_column_takes_excels_clock_cells(tmp_path):
         book.active.append(row)
     book.save(tmp_path / "clock.xlsx")
     assert list(np.diff(read_measured(tmp_path / "clock.xlsx").columns[0].values)) == [2]
+
+
+@pytest.mark.parametrize(
+    ("header", "units", "found"),
+    [
+        ("speed,torque,fuel,coolant", "rpm,Nm,kg/h,degC", ["rpm", "Nm", "kg/h", "degC"]),
+        ("speed,torque,fuel,CO", "rpm,Nm,kg/h,ppm", ["rpm", "Nm", "kg/h", "ppm"]),
+        ("time,speed,T", "s,km/h,°C", ["s", "km/h", "°C"]),
+        ("time,speed,note", "s,km/h,", ["s", "km/h", None]),
+    ],
+)
+def test_a_units_row_may_hold_units_that_no_table_knows(tmp_path, header, units, found):
+    row = ",".join("1.5" for _ in found)
+    measured = read(tmp_path, f"{header}\n{units}\n{row}\n{row}\n")
+    assert [c.name for c in measured.columns] == header.split(",")
+    assert [c.unit for c in measured.columns] == found
+    assert "units row in line 2" in measured.notes and list(measured.lines) == [3, 4]
+    strange = measured.columns[2]
+    if found[2] == "°C":
+        with pytest.raises(DataError, match="column T: unit '°C' is unknown"):
+            in_si(measured, strange, ("speed",), "--unit speed=UNIT")
+
+
+def test_names_below_titles_are_no_units_row_and_a_name_may_be_a_unit(tmp_path):
+    measured = read(tmp_path, "Engine,Engine,Emissions\nrpm,Nm,NOx\n800,10,1\n900,20,2\n")
+    assert [(c.name, c.unit) for c in measured.columns] == [
+        ("rpm", "rpm"), ("Nm", "Nm"), ("NOx", None),
+    ]  # fmt: skip
