@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 
@@ -66,7 +67,7 @@ def import_cycle(
 
     if out is not None:
         _check_out(out, file)
-    units = _pairs("--unit", unit)
+    units = pairs("--unit", unit)
     for role, given, option in (
         ("speed", speed_unit, "--speed-unit"),
         ("time", time_unit, "--time-unit"),
@@ -77,7 +78,7 @@ def import_cycle(
             )
         units |= {} if given is None else {role: given}
     imported = cycle_import.import_cycle(
-        file, columns=_pairs("--column", column), units=units, sheet=sheet, repair=repair,
+        file, columns=pairs("--column", column), units=units, sheet=sheet, repair=repair,
         acceleration_mps2=acceleration,
         standstill_mps=None if standstill is None else standstill_limit(standstill),
         altitude_baseline_m=altitude_baseline,
@@ -104,19 +105,6 @@ def _show(imported: "Imported") -> None:
         write(f"{name:18}{text}")
     for text in imported.hints:
         write(text)
-
-
-def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for text in given or []:
-        role, equals, value = text.partition("=")
-        if not equals or role in pairs:
-            why = "is not of the form ROLE=VALUE" if not equals else f"gives {role} twice"
-            raise DataError(
-                f"{option} {text!r} {why}; such as {option} speed={'NAME' if 'c' in option else 'km/h'}"
-            )
-        pairs[role.strip()] = value
-    return pairs
 
 
 def _check_out(out: Path, file: Path) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 from hevopt.files import printable, shown
@@ -161,8 +162,8 @@ def coastdown(
     car = car_base(like, values, rotating_mass_kg)
     check_mass(mass_kg)
     ways = None if directions is None else _ways(directions)
-    columns = _pairs(column, "--column", ROLES)
-    units = _pairs(unit, "--unit", ROLES_WITH_UNIT)
+    columns = pairs("--column", column, ROLES)
+    units = pairs("--unit", unit, ROLES_WITH_UNIT)
     runs, notes = read_runs(files, columns, units, ways, sheet)
     fit = fit_road_load(runs, mass_kg + car.rotating_kg)
     said = results(runs, fit, mass_kg, car.rotating_kg)
@@ -202,7 +203,7 @@ def _request(
     from hevopt.imports.map_import import Request
     from hevopt.imports.map_tables import ROLES, Source
 
-    columns, units = _pairs(column, "--column", ROLES), _pairs(unit, "--unit", ROLES)
+    columns, units = pairs("--column", column, ROLES), pairs("--unit", unit, ROLES)
     others = {}
     for role, text in extra.items():
         if text is not None:
@@ -211,19 +212,6 @@ def _request(
             of_sheet = of_sheet if mark else None
             others[role] = Source(Path(path), of_sheet, own, units, rows, extra=True)
     return Request(Source(file, sheet, columns, units, rows), others, like, values)
-
-
-def _pairs(texts: list[str] | None, option: str, roles: tuple[str, ...]) -> dict[str, str]:
-    """ROLE=TEXT as a mapping; DataError for another role."""
-    pairs = {}
-    for text in texts or []:
-        role, mark, value = text.partition("=")
-        if not mark or role not in roles or not value.strip():
-            raise DataError(
-                f"{option} {shown(text)}: ROLE=TEXT is needed; roles: {', '.join(roles)}"
-            )
-        pairs[role] = value.strip()
-    return pairs
 
 
 def _values(texts: list[str] | None) -> dict[str, Any]:

@@ -6,6 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from hevopt.errors import DataError
+from hevopt.files import shown
+
 CycleOption = Annotated[str | None, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
 NoxOption = Annotated[
     float | None,
@@ -106,3 +109,26 @@ def _as_in_a_file(given: dict[str, Any]) -> dict[str, Any]:
         except ValueError:
             pass  # a word, which is checked with the others
     return values
+
+
+def pairs(
+    option: str, texts: list[str] | None, roles: tuple[str, ...] | None = None
+) -> dict[str, str]:
+    """ROLE=VALUE of a repeated option as a mapping; DataError for another form, or a role given twice.
+
+    roles: those allowed, none of which may be left empty; None: whoever uses the mapping knows
+    """
+    found: dict[str, str] = {}
+    for text in texts or []:
+        role, equals, value = (part.strip() for part in text.partition("="))
+        such = f"such as {option} speed={'NAME' if 'c' in option else 'km/h'}"
+        if not equals or (roles is not None and not value):
+            raise DataError(f"{option} {shown(text)} is not of the form ROLE=VALUE; {such}")
+        if roles is not None and role not in roles:
+            raise DataError(
+                f"{option} {shown(text)}: no role {shown(role)}; roles: {', '.join(roles)}"
+            )
+        if role in found:
+            raise DataError(f"{option} {shown(text)} gives {role} twice; leave one out")
+        found[role] = value
+    return found

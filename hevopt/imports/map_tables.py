@@ -28,12 +28,12 @@ Array = NDArray[np.float64]
 _ALIASES = {
     "speed": {
         "speed", "n", "enginespeed", "machinespeed", "motorspeed", "rotationalspeed", "rpm", "omega", "w", "neng",
-        "nengine", "nmot", "engspeed", "speedengine", "shaftspeed", "radps", "rads",
+        "nengine", "nmot", "engspeed", "speedengine", "shaftspeed", "radps", "rads", "drehzahl",
     },
     "torque": {
         "torque", "t", "m", "md", "tq", "trq", "enginetorque", "machinetorque", "motortorque", "braketorque",
         "shafttorque", "engtorque", "nm", "load", "bmep", "pme", "mep", "brakemeaneffectivepressure",
-        "meaneffectivepressure",
+        "meaneffectivepressure", "drehmoment",
     },
     "fuel": {
         "fuel", "fuelflow", "fuelrate", "fuelmassflow", "fuelconsumption", "fc", "mfuel", "mdotfuel", "fuelmass",
@@ -210,8 +210,10 @@ def _grid(measured: Measured, source: Source, what: str) -> Table:
 
 
 def _axes(measured: Measured, source: Source) -> tuple[str, str, dict[str, str | None]]:
-    r"""Roles of a grid's first column and first row, and their units: `speed [rpm] \ torque [Nm]`."""
-    parts = [part.strip() for part in measured.columns[0].name.split("\\")]
+    r"""Roles of a grid's first column and first row, and their units: `speed [rpm] \ torque [Nm]`, or a slash."""
+    corner = measured.columns[0].name
+    # A slash behind a bracket parts the axes; elsewhere it is one of a unit's, such as rad/s.
+    parts = [part.strip() for part in re.split(r"\\|(?<=[\])])\s*/", corner)]
     named = [
         next((r for r in ("speed", "torque") if base_of(p) in _ALIASES[r]), None) for p in parts
     ]

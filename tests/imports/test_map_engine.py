@@ -194,3 +194,34 @@ def test_the_plot_colours_what_a_car_can_use_and_nothing_else(hevopt):
     shown = green[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
     # Points, lines and hatches are drawn over the colour, and edges fall within pixels.
     assert (shown & ~usable).mean() < 0.005 and (usable & ~shown).mean() < 0.1
+
+
+@pytest.mark.parametrize(
+    "corner", ["speed [rpm]/torque [Nm]", "Drehzahl [1/min] / Drehmoment [Nm]"]
+)
+def test_a_grid_may_part_its_axes_with_a_slash(hevopt, corner):
+    fuel = bench((10, 50, 90), False)[:, 2]
+    table = np.reshape(fuel, (len(SPEEDS), 3))
+    rows = [
+        f"{s},{','.join(f'{x:.6g}' for x in row)}" for s, row in zip(SPEEDS, table, strict=True)
+    ]
+    Path("b.csv").write_text("\n".join([f"{corner},10,50,90", *rows]) + "\n")
+    seen = hevopt(*IMPORT, "--unit", "fuel=g/h")
+    assert seen.status == 0, seen
+    found = component("b.toml")["fuel_map"]
+    first = found["torque_nm"].index(10)
+    assert_allclose(np.array(found["fuel_gps"])[:, first:] * 3600, table, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--unit", "speed"), "--unit 'speed' is not of the form ROLE=VALUE"),
+        (("--unit", "speed="), "is not of the form ROLE=VALUE"),
+        (("--unit", "speed=rpm", "--unit", "speed=rad/s"), "gives speed twice"),
+    ],
+)
+def test_an_option_of_pairs_is_checked_alike_in_every_command(hevopt, words, said):
+    write("b.csv", "n,T [Nm],fuel [g/h]", *bench().T[:3])
+    seen = hevopt(*IMPORT, *words)
+    assert seen.status == 2 and said in seen.err, seen
