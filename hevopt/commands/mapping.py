@@ -14,6 +14,9 @@ from hevopt.files import printable, shown
 if TYPE_CHECKING:
     from hevopt.imports.map_import import Request
 
+# First line of every component that an import writes, by which the next import knows it.
+_HEAD = "Measured map, written by hevopt maps import."
+
 maps_app = typer.Typer(help="Measured maps of engines and machines.", rich_markup_mode=None)
 
 _ColumnOption = Annotated[
@@ -91,10 +94,11 @@ def import_map(
     out = _beside(file, ".toml") if out is None else out
     plot = _beside(out, ".png")
     check_outs({"--out": out, "the plot": plot}, sources)
+    _check_own(out, plot)
     imported = import_engine(request) if kind == "engine" else import_machine(request)
     said = coverage(imported)
     head = [
-        "Measured map, written by hevopt maps import.",
+        _HEAD,
         *_digests(sources),
         *imported.notes,
         *said,
@@ -253,6 +257,20 @@ def _beside(path: Path, suffix: str) -> Path:
     if not path.stem or path.stem == "..":
         raise DataError(f"{path}: not the name of a file")
     return path.with_suffix(suffix)
+
+
+def _check_own(out: Path, plot: Path) -> None:
+    """DataError where the component or its plot would replace a file that no map import has written."""
+    if out.exists():
+        with out.open("rb") as file:
+            if file.readline().strip() == f"# {_HEAD}".encode():
+                return
+    for path in (out, plot):
+        if path.exists():
+            raise DataError(
+                f"{path} exists, and hevopt maps import has not written it; give another name with --out, or "
+                "remove it yourself"
+            )
 
 
 def _digests(sources: list[Path]) -> list[str]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError
 from hevopt.files import shown
 
-EMPTY = frozenset(("", "nan", "na", "n/a", "#n/a", "-", "--", "null", "none"))
+EMPTY = frozenset(("", "nan", "na", "n/a", "#n/a", "#div/0!", "-", "--", "null", "none"))
 # Faults of one kind that a message lists before it counts the rest.
 LISTED = 20
 # Different texts of a column whose rows are all kept, such as north and south.

@@ -225,3 +225,24 @@ def test_an_option_of_pairs_is_checked_alike_in_every_command(hevopt, words, sai
     write("b.csv", "n,T [Nm],fuel [g/h]", *bench().T[:3])
     seen = hevopt(*IMPORT, *words)
     assert seen.status == 2 and said in seen.err, seen
+
+
+def test_a_file_that_no_import_has_written_is_not_replaced(hevopt):
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    for name in ("b.toml", "b.png"):
+        Path(name).write_text("mine")
+        seen = hevopt(*IMPORT)
+        assert seen.status == 2 and f"{name} exists, and hevopt maps import has not" in seen.err
+        assert Path(name).read_text() == "mine"
+        Path(name).unlink()
+    assert hevopt(*IMPORT).status == 0 and hevopt(*IMPORT).status == 0
+
+
+def test_a_division_by_0_of_a_spreadsheet_is_a_point_without_power(hevopt):
+    rpm, torque, fuel, _ = bench(full=False).T
+    specific = [f"{f / (r * RPM * t / 1e3):.7g}" if t else "#DIV/0!"
+                for r, t, f in zip(rpm, torque, fuel, strict=True)]  # fmt: skip
+    rows = [f"{r:g},{t:g},{b}" for r, t, b in zip(rpm, torque, specific, strict=True)]
+    Path("b.csv").write_text("\n".join(["n [rpm],T [Nm],be [g/kWh]", *rows]) + "\n")
+    seen = hevopt(*IMPORT)
+    assert seen.status == 0 and "fuel: 15 points not measured, lines 2, " in seen.out, seen
