@@ -52,7 +52,9 @@ _QUANTITIES = {
     "altitude": ("length",),
 }
 _READ_AS = {
-    "time": "a time that can be read (seconds, 10:00:01 with hours, minutes and seconds, or 2024-02-01 10:00:01)"
+    "time": "a time that can be read (seconds, 10:00:01 with hours, minutes and seconds, 10:00:01 AM, or "
+    "2024-02-01 10:00:01, 2024/02/01 10:00:01, 01.02.2024 10:00:01; 01/02/2024 where the column shows which of "
+    "the two is the day)"
 }
 _OPTIONS = {"time": "--time-unit", "speed": "--speed-unit"}
 

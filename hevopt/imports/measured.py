@@ -147,8 +147,9 @@ def _columns(path: Path, table: Table) -> list[Column]:
             unit, source = convention[name]
         stated = [convention[name]] if name in convention else units_in_name(name)
         against = next((s for s in stated if unit and unit_named(s[0]) != unit_named(unit)), None)
+        values = cells.values()
         column = Column(
-            name, unit, cells.values(), source, tuple(cells.strange), cells.strange_count, cells.words, against
+            name, unit, values, source, tuple(cells.strange), cells.strange_count, cells.words, against
         )  # fmt: skip
         column = _carrying_units(column, cells, table)
         column.values.flags.writeable = False
@@ -159,8 +160,9 @@ def _columns(path: Path, table: Table) -> list[Column]:
 def _carrying_units(column: Column, cells: Cells, table: Table) -> Column:
     """The column whose cells are dates, times of day or per cent: these are never scaled by another unit."""
     plain = cells.number_count - cells.percent_count
+    clock = "dates or times of day" + f", {cells.order}" * bool(cells.order)
     for kind, count, others, unit, what in (
-        ("clock", cells.clock_count, cells.number_count, "s", "dates or times of day"),
+        ("clock", cells.clock_count, cells.number_count, "s", clock),
         ("percent", cells.percent_count, plain + cells.clock_count, "%", "cells in per cent"),
     ):
         if not count:

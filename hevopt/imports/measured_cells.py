@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import shown
+from hevopt.imports.measured_dates import Slashed, in_order, is_moment, moment_in
 
 EMPTY = frozenset(("", "nan", "na", "n/a", "#n/a", "#div/0!", "-", "--", "null", "none"))
 # Faults of one kind that a message lists before it counts the rest.
@@ -30,9 +31,7 @@ _POINT = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _PERHAPS_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '’\u00a0\u202f][0-9]{3})+(?:[.,][0-9]+)?")
-_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}[ T][0-9]{2}:[0-9]{2}.*")
 _PERCENT = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s?%")
-_CLOCK = re.compile(r"([0-9]{1,6}):([0-9]{2}):([0-9]{2}(?:[.,][0-9]+)?)")
 
 
 @dataclass(slots=True)
@@ -41,6 +40,7 @@ class Cells:
 
     strange: (row, text) of cells that are neither numbers nor empty; words: rows of each text among them, of the
     first few texts; clock: rows with dates or times of day; percent: rows with numbers such as 3 %
+    slashed: row, two numbers, year and seconds of each date whose order the column decides, which is then `order`
     """
 
     chunks: list[NDArray[np.float64]] = field(default_factory=list)
@@ -53,15 +53,29 @@ class Cells:
     number_count: int = 0
     slow_count: int = 0
     first_date: datetime | None = None
+    slashed: array = field(default_factory=lambda: array("d"))
+    order: str = ""
 
     def values(self) -> NDArray[np.float64]:
-        """(row,) NaN where a cell is empty or strange."""
-        return np.concatenate(self.chunks) if self.chunks else np.empty(0)
+        """(row,) NaN where a cell is empty or strange; dates of open order are decided here, or become strange."""
+        values = np.concatenate(self.chunks) if self.chunks else np.empty(0)
+        if not self.slashed:
+            return values
+        count = len(self.slashed) // 5
+        decided = in_order(self.slashed) if count == self.clock_count else None
+        if decided is None:
+            self.strange.insert(0, (int(self.slashed[0]), self.found["clock"][1]))
+            self.strange_count += count
+            self.clock_count -= count
+        else:
+            rows, seconds, self.order = decided
+            values[rows] = seconds
+        return values
 
 
 def is_value(text: str) -> bool:
     """Whether a cell could be one of a data row: a number, a date or a time of day."""
-    return any(p.fullmatch(text) for p in (_POINT, _COMMA, _PERCENT, _THOUSANDS, _DATE, _CLOCK))
+    return any(p.fullmatch(text) for p in (_POINT, _COMMA, _PERCENT, _THOUSANDS)) or is_moment(text)
 
 
 def is_empty(text: str) -> bool:
@@ -124,7 +138,7 @@ def _slow(column: Cells, cell: str, line: int, row: int) -> float:
     if cell.lower() in EMPTY:
         return np.nan
     if cell[0] in "0123456789+-.,":
-        value = _number(column, cell, line)
+        value = _number(column, cell, line, row)
         if value is not None:
             return value
     column.strange_count += 1
@@ -135,7 +149,7 @@ def _slow(column: Cells, cell: str, line: int, row: int) -> float:
     return np.nan
 
 
-def _number(column: Cells, cell: str, line: int) -> float | None:
+def _number(column: Cells, cell: str, line: int, row: int) -> float | None:
     """A number, or the seconds of a date or a time of day; None where a cell is neither."""
     percent = _PERCENT.fullmatch(cell)
     cell = cell[:-1].rstrip() if percent else cell
@@ -154,7 +168,7 @@ def _number(column: Cells, cell: str, line: int) -> float | None:
         elif "." in cell:
             column.found.setdefault("point", (line, cell))
         return value
-    moment = _moment(column, cell)
+    moment = _moment(column, cell, row)
     if moment is not None:
         column.clock_count += 1
         column.found.setdefault("clock", (line, cell))
@@ -163,20 +177,19 @@ def _number(column: Cells, cell: str, line: int) -> float | None:
     return moment
 
 
-def _moment(column: Cells, cell: str) -> float | None:
-    """Seconds since the column's first date, or since midnight."""
-    if cell[4:5] == "-" and len(cell) > 15:
+def _moment(column: Cells, cell: str, row: int) -> float | None:
+    """Seconds since the column's first date, or since midnight; NaN for a date that the whole column decides."""
+    moment = moment_in(cell)
+    if isinstance(moment, Slashed):
+        column.slashed.extend((row, *moment))
+        return np.nan
+    if isinstance(moment, datetime):
+        column.first_date = column.first_date or moment
         try:
-            moment = datetime.fromisoformat(cell.replace(",", "."))
-            column.first_date = column.first_date or moment
             return (moment - column.first_date).total_seconds()
-        except (ValueError, TypeError, OverflowError):  # no such day; with and without time zone
+        except TypeError:  # with and without time zone
             return None
-    clock = _CLOCK.fullmatch(cell)
-    if clock is None:
-        return None
-    hours, minutes, seconds = clock.groups()
-    return int(hours) * 3600.0 + int(minutes) * 60.0 + float(seconds.replace(",", "."))
+    return moment
 
 
 def check_decimal_mark(path: Path, columns: Sequence[Cells]) -> str:

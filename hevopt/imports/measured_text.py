@@ -2,6 +2,7 @@
 
 import codecs
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +17,9 @@ _HEAD_LINES = 500
 _HEAD_LINE_MAX = 50_000
 _COMMENTS = ("#", "%", "//", "*")
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+# Cells of which some are in quotes and go on in the next line, as wrapped headers of Excel do.
+_QUOTED_LINE = re.compile(r"{0}(?:[,;\t|]{0})*".format(r'(?:\s*"(?:[^"]|"")*"\s*|[^",;\t|\n]*)'))
+_CELL_LINES_MAX = 10
 _BYTE_ORDER_MARKS = {
     codecs.BOM_UTF8: ("utf-8-sig", "UTF-8"),
     codecs.BOM_UTF16_LE: ("utf-16", "UTF-16"),
@@ -30,7 +34,7 @@ def text_table(path: Path, contents: bytes) -> Table:
     """The table in the bytes of a text file."""
     text, encoding = _decoded(path, contents)
     lines = _lines(path, text)
-    kept, comments, blank = _without_comments(lines)
+    kept, comments, blank = _without_comments(_joined(lines))
     separator = _separator([line for _, line in kept[:_HEAD_LINES] if len(line) < _HEAD_LINE_MAX])
     if separator != "\t":
         blank = sorted(blank + [number for number, line in kept if line.isspace()])
@@ -86,10 +90,33 @@ def _lines(path: Path, text: str) -> list[str]:
     return lines
 
 
-def _without_comments(lines: list[str]) -> tuple[Lines, Lines, list[int]]:
+def _joined(lines: list[str]) -> Lines:
+    """The lines with their numbers; those of a quoted cell with line breaks are one, numbered by its first."""
+    joined: Lines = []
+    numbered = iter(enumerate(lines, start=1))
+    for number, line in numbered:
+        more = _quoted_lines(lines, number) if '"' in line else 0
+        parts = [line, *(next(numbered)[1] for _ in range(more))]
+        joined.append((number, " ".join(parts)))
+    return joined
+
+
+def _quoted_lines(lines: list[str], number: int) -> int:
+    """How many lines after this one belong to a cell whose quote it opens; 0 where no line soon closes it."""
+    line = lines[number - 1]
+    if line.count('"') % 2 == 0 or line.lstrip().startswith(_COMMENTS):
+        return 0
+    for more, later in enumerate(lines[number : number + _CELL_LINES_MAX], start=1):
+        if later.count('"') % 2:
+            whole = "\n".join(lines[number - 1 : number + more])
+            return more if _QUOTED_LINE.fullmatch(whole) else 0
+    return 0
+
+
+def _without_comments(lines: Lines) -> tuple[Lines, Lines, list[int]]:
     """Lines with cells, which blanks between tabs are too, comment lines, and the numbers of blank lines."""
     kept, comments, blank = [], [], []
-    for number, line in enumerate(lines, start=1):
+    for number, line in lines:
         start = line.lstrip()
         if not start and "\t" not in line:
             blank.append(number)

@@ -371,3 +371,34 @@ def test_names_below_titles_are_no_units_row_and_a_name_may_be_a_unit(tmp_path):
     assert [(c.name, c.unit) for c in measured.columns] == [
         ("rpm", "rpm"), ("Nm", "Nm"), ("NOx", None),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+def test_quoted_cells_may_hold_line_breaks_and_lines_keep_their_numbers(tmp_path, separator, ends):
+    rows = [
+        ["Time\n[s]", "Speed\n\n[km/h]", 'Note ""x""'],
+        ["0", "10", "a"],
+        ["1", "11", "b\nc\n# d"],
+    ]
+    rows += [["2", "oops", "e"], ["3", "13", "f"]]
+    text = "\n".join(separator.join(f'"{cell}"' for cell in row) for row in rows)
+    measured = read(tmp_path, text.replace("\n", ends))
+    assert [c.name for c in measured.columns] == ["Time [s]", "Speed [km/h]", 'Note "x"']
+    assert list(measured.columns[0].values) == [0, 1, 2, 3]
+    assert list(measured.lines) == [5, 6, 9, 10]
+    with pytest.raises(DataError, match="line 9: 'oops'"):
+        in_si(measured, measured.columns[1], ["speed"], "--speed-unit")
+
+
+@pytest.mark.parametrize(
+    "text", ['t,v\n0,1\n1,"2\n2,3\n3,"4\n', 't,v\n0,"1\n' + "1,2\n" * 20 + '3,4"\n']
+)
+def test_a_quote_that_is_not_closed_takes_no_lines_along(tmp_path, text):
+    assert "a quote is opened and not closed in the line" in refusal(tmp_path, text)
+
+
+def test_blank_lines_are_told_by_their_numbers(tmp_path):
+    measured = read(tmp_path, "t [s],v\n\n0,1\n  \n\n1,2\n\n")
+    assert "blank: lines 2, 4-5" in measured.notes and list(measured.lines) == [3, 6]
+    assert not any("blank" in note for note in read(tmp_path, "t [s],v\n0,1\n1,2\n").notes)
