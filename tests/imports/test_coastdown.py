@@ -427,3 +427,17 @@ def test_fewer_than_two_runs_in_a_direction_are_no_fit():
     for k in (1, 3):
         with pytest.raises(DataError, match="needed: 2 or more"):
             fit_road_load(runs[:k], MASS_KG + ROTATING_KG)
+
+
+def test_winds_that_differ_by_run_are_taken_out_without_bias():
+    """Each run is an exact quadratic: C0 of (12) is known, with what the scatter of e adds to the square of e."""
+    winds_mps = np.array([0.0, 3.0, 6.0])
+    pairs = [coast(np.random.default_rng(1), 2, wind=w, speeds=((34.0, 8.0),)) for w in winds_mps]
+    fit = fit_road_load([run for pair in pairs for run in pair], MASS_KG + ROTATING_KG)
+    constant = TRUTH[0] + TRUTH[2] * np.mean(winds_mps**2)
+    e = 2 * TRUTH[2] * winds_mps.mean()
+    # Half the difference of two means of three runs, each run's 2 C2 w.
+    variance_of_e = 2 * (2 * TRUTH[2]) ** 2 * winds_mps.var(ddof=1) / 3 / 4
+    expected = constant - (e**2 - variance_of_e) / (4 * TRUTH[2])
+    assert variance_of_e / (4 * TRUTH[2]) > 0.5
+    assert fit.coefficients[0] == pytest.approx(expected, abs=0.01)
