@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
+from hevopt.imports import column_names
 from hevopt.imports.coastdown import Run
 from hevopt.imports.coastdown_directions import Directions, Way, directions_in, signs
 from hevopt.imports.measured import (
@@ -27,8 +28,8 @@ from hevopt.imports.measured import (
 Array = NDArray[np.float64]
 
 _ALIASES = {
-    "time": {"time", "t", "zeit", "timestamp", "elapsedtime", "testtime", "cyctime", "seconds"},
-    "speed": {"speed", "v", "vehiclespeed", "velocity", "vehspeed", "vveh", "gpsspeed", "groundspeed"},
+    "time": column_names.TIME,
+    "speed": column_names.SPEED,
     "run": {"run", "runnumber", "runno", "runid", "test", "testnumber", "coastdown"},
     "direction": {"direction", "dir", "heading", "way"},
 }  # fmt: skip

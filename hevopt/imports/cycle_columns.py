@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError, unknown_name
 from hevopt.files import shown
+from hevopt.imports import column_names
 from hevopt.imports.measured import (
     Column,
     Measured,
@@ -20,18 +21,10 @@ from hevopt.imports.measured_names import grade_ends_step
 
 Array = NDArray[np.float64]
 
-_ARRAYS = ("cycmph", "cyckph", "cyckmh", "cycmps")
 # Role -> names without unit, in small letters and digits, by which a column is found on its own.
 _ALIASES: dict[str, tuple[str, ...]] = {
-    "time": (
-        "time", "t", "zeit", "timestamp", "elapsedtime", "seconds", "secs", "sec", "cycsecs",
-        "datetime", "uhrzeit", "clock", *(f"{name}1" for name in _ARRAYS),
-    ),
-    "speed": (
-        "speed", "v", "velocity", "vehiclespeed", "vehspeed", "vehiclevelocity", "targetspeed",
-        "cyclespeed", "gpsspeed", "speedgps", "geschwindigkeit", "fahrzeuggeschwindigkeit", "vveh",
-        "cycmps", "mps", "mph", "kmh", "kph", "kmph", *(f"{name}2" for name in _ARRAYS),
-    ),
+    "time": column_names.TIME,
+    "speed": column_names.SPEED,
     "distance": ("distance", "dist", "s", "station", "weg", "travelleddistance"),
     "stop": ("stop", "stoptime", "stoppingtime"),
     "grade": (

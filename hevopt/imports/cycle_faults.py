@@ -35,14 +35,25 @@ def sound(drive: Drive, repair: bool) -> tuple[Drive, list[str]]:
     rows = len(drive.lines)
     if not repair:
         advice = "correct the file, or let --repair mend these lines as told"
-        raise refused(drive.measured.path, faults, advice)
+        raise refused(drive.measured.path, faults, advice + _rates(drive))
     if lines > _REPAIRED_SHARE_MAX * rows:
         raise refused(
             drive.measured.path, faults,
             f"{lines} of {rows} lines are more than the {_REPAIRED_SHARE_MAX:.0%} that --repair changes; correct "
-            "the file, or check the columns and their units",
+            "the file, or check the columns and their units" + _rates(drive),
         )  # fmt: skip
     return mended, faults.texts()
+
+
+def _rates(drive: Drive) -> str:
+    """What to do with a log of several rates, whose speed stands in some rows only; '' for others."""
+    known, rows = int(np.isfinite(drive.speed_mps).sum()), len(drive.speed_mps)
+    if known > (1 - _REPAIRED_SHARE_MAX) * rows or known < 2:
+        return ""
+    return (
+        f"; {known} of {rows} lines have a speed: where the log writes it less often than other columns, keep the "
+        "lines with a speed alone"
+    )
 
 
 def _repaired(drive: Drive, faults: Faults) -> Drive:

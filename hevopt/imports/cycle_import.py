@@ -17,7 +17,7 @@ from hevopt.imports.cycle_columns import Drive, drive_of
 from hevopt.imports.cycle_distance import over_time
 from hevopt.imports.cycle_faults import sound
 from hevopt.imports.cycle_standstill import never_at_rest, standing
-from hevopt.imports.cycle_times import long_steps
+from hevopt.imports.cycle_times import coarse, long_steps
 from hevopt.imports.measured import read_measured
 from hevopt.imports.resample import (
     distance_at,
@@ -87,10 +87,10 @@ def import_cycle(
         raise DataError(f"{measured.path}: a drive over time; leave --acceleration out")
     else:
         drive, repairs = sound(drive, repair)
-        changes = long_steps(drive)
+        changes, hints = long_steps(drive), coarse(drive)
         distance_m = _distance(drive)[-1]
         if standstill_mps is None:
-            hints = never_at_rest(drive)
+            hints += never_at_rest(drive)
         else:
             drive, counted = standing(drive, standstill_mps)
             changes += counted

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 _GAP_STEPS, _GAP_MIN_S = 5.0, 2.0
 _LONG_STEPS = 3.0
+_USUAL_MAX_S = 10.0
 _DAY_S = 86400.0
 _SAME_TIME_S = 1e-6
 
@@ -123,4 +124,15 @@ def long_steps(drive: Drive) -> list[str]:
     return [
         f"speed drawn straight across {len(rows)} steps of more than {_LONG_STEPS:g} times the usual "
         f"{usual_s:g} s: {'; '.join(texts)}{f' and {len(rows) - LISTED} more' * (len(rows) > LISTED)}"
+    ]
+
+
+def coarse(drive: Drive) -> list[str]:
+    """A text where the usual step is so long that the unit of time may be another; none otherwise."""
+    usual_s = float(np.median(np.diff(drive.time_s)))
+    if usual_s <= _USUAL_MAX_S:
+        return []
+    return [
+        f"NOTE: the usual step of the file is {usual_s:g} s, with the speed drawn straight across; if that is not "
+        "so, the unit of time is another, such as --time-unit ms"
     ]

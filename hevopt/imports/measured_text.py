@@ -16,7 +16,7 @@ _LINE_MAX = 1_000_000
 _HEAD_LINES = 500
 _HEAD_LINE_MAX = 50_000
 _COMMENTS = ("#", "%", "//", "*")
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
 # Cells of which some are in quotes and go on in the next line, as wrapped headers of Excel do.
 _QUOTED_LINE = re.compile(r"{0}(?:[,;\t|]{0})*".format(r'(?:\s*"(?:[^"]|"")*"\s*|[^",;\t|\n]*)'))
 _CELL_LINES_MAX = 10

@@ -146,3 +146,31 @@ def test_many_wild_samples_end_in_a_message_soon(tmp_path):
     began = process_time()
     assert "more than the 25% that --repair changes" in refusal(tmp_path, text, repair=True)
     assert process_time() - began < 10
+
+
+@pytest.mark.parametrize("repair", [False, True])
+def test_a_log_of_several_rates_is_told_what_to_do(tmp_path, repair):
+    rows = [f"{t / 10},{t / 20 if t % 5 == 0 else ''},900\n" for t in range(101)]
+    head = "time_s,speed_mps,rpm\n"
+    message = refusal(tmp_path, head + "".join(rows), repair=repair)
+    assert "21 of 101 lines have a speed" in message and "keep the lines with a speed" in message
+    assert imported(tmp_path, head + "".join(rows[::5])).cycle.duration_s == 10
+    missing = PLAIN.replace("5,36", "5,")
+    assert "lines have a speed" not in refusal(tmp_path, "time_s,speed_kmh\n" + missing)
+
+
+def test_a_usual_step_of_many_seconds_is_told(tmp_path):
+    rows = "".join(f"{1000 * t},{v}\n" for t, v in enumerate(DRIVE_KMH))
+    (hint,) = imported(tmp_path, "time_s,speed_kmh\n" + rows).hints
+    assert "usual step of the file is 1000 s" in hint and "--time-unit ms" in hint
+    assert not imported(tmp_path, "time,speed_kmh\n" + rows, units={"time": "ms"}).hints
+
+
+@pytest.mark.parametrize(
+    "header", ["elapsed_s,v_Ist [km/h]", "t [s],veh_spd_kmh", "cyc_time_s,ground_speed_kmh"]
+)
+@pytest.mark.parametrize("separator", [",", "|"])
+def test_more_names_and_bars_are_read(tmp_path, header, separator):
+    expected = imported(tmp_path, "time_s,speed_kmh\n" + PLAIN)
+    text = f"{header}\n{PLAIN}".replace(",", separator)
+    assert columns(imported(tmp_path, text, "other.csv").text) == columns(expected.text)
