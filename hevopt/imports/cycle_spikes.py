@@ -139,7 +139,10 @@ def _best_series(
 
 
 def text_of(spike: Spike, time_s: Array, speed_mps: Array, lines: Rows) -> tuple[str, tuple]:
-    """What a fault says of a spike, and what it is filled with."""
+    """What a fault says of a spike, and what it is filled with; the jump of a piece stands in its first line."""
+    if spike.row != spike.first:
+        values = (speed_mps[spike.row] * KMH_PER_MPS, lines[spike.first])
+        return "speed {:.4g} km/h is off as line {} is; drawn between its neighbours", values
     edge, other = spike.edge, spike.other
     step_s = abs(time_s[edge] - time_s[other])
     change_mps2 = abs(speed_mps[edge] - speed_mps[other]) / step_s

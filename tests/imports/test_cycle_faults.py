@@ -122,6 +122,7 @@ def test_a_dropout_is_found_and_mended_as_a_whole(tmp_path, hertz, long_s):
     message = refusal(tmp_path, written(time_s, speed_mps))
     assert f"{count} faults ({count} spikes)" in message
     assert f"in lines {begins + 2} to {begins + count + 1} that are off as a whole" in message
+    assert f"line {begins + 3}: speed 0 km/h is off as line {begins + 2} is" in message
     result = imported(tmp_path, written(time_s, speed_mps), repair=True)
     assert len(result.repairs) == count
     assert result.cycle.speed_mps == pytest.approx(60 / 3.6)
