@@ -21,7 +21,7 @@ def written(headings, head="run,heading [deg],time_s,speed_kmh", runs=True, nois
             ",".join([str(k + 1)] * runs + [f"{h:.4f}", f"{start_s + s:.1f}", f"{u * 3.6:.4f}"])
             for h, s, u in zip(shown, t, v, strict=True)
         ]
-        start_s += 100
+        start_s += 100 if runs else 60
     Path("c.csv").write_text("\n".join([head, *rows]) + "\n")
 
 
