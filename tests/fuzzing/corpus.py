@@ -1,29 +1,18 @@
 """Good files of every kind that hevopt reads, and the command that reads each: what the fuzzer starts from."""
 
-import io
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
 
-import numpy as np
-
-ROOT = Path(__file__).parents[2]
-ARCHITECTURES, CYCLES = ROOT / "architectures", ROOT / "cycles"
-SHORT_CYCLE = Path(__file__).parent / "short.csv"
+from fuzzing.measured import measured
+from fuzzing.results import results
+from fuzzing.seed import ARCHITECTURES, COMPONENTS, CYCLES, SHORT_CYCLE, Seed
 
 
-@dataclass(frozen=True)
-class Seed:
-    """A file, and sets of words after `hevopt` that read it."""
-
-    name: str
-    contents: bytes
-    commands: tuple[Sequence[str], ...]
-
-
+@cache
 def seeds() -> list[Seed]:
     """One or more of every kind."""
-    return [*_own_files(), *_logs(), *_maps(), *_coastdowns(), *_studies()]
+    return [*_own_files(), *measured(), *_studies(), *results()]
 
 
 def _own_files() -> list[Seed]:
@@ -40,80 +29,52 @@ def _own_files() -> list[Seed]:
         text = (ARCHITECTURES / f"{name}.toml").read_bytes()
         run = ("run", "./car.toml", "--strategy", "conventional" if name != "A" else "baseline",
                "--cycle", str(SHORT_CYCLE), "--allow-shortfall")  # fmt: skip
-        files.append(Seed("car.toml", text, (_with(validate, "car.toml"), run)))
-    for path in sorted((ARCHITECTURES / "components").glob("*.toml")):
-        key = path.stem.split("_")[0]
+        new = ("architectures", "new", "mine", "--like", "./car.toml", "--components", "all")
+        files.append(Seed("car.toml", text, (_with(validate, "car.toml"), run, new)))
+    parts = [(path.stem, path.read_bytes()) for path in sorted(COMPONENTS.glob("*.toml"))]
+    for name, contents in [*parts, *_with_measured_maps()]:
+        key = name.split("_")[0]
         run = ("run", "C2" if key not in ("machine",) else "D", "--strategy", "ecms", "--cycle",
                str(SHORT_CYCLE), "--allow-shortfall", "--set", f'{key}="./part.toml"')  # fmt: skip
-        files.append(Seed("part.toml", path.read_bytes(), (_with(validate, "part.toml"), run)))
+        files.append(Seed("part.toml", contents, (_with(validate, "part.toml"), run)))
     return files
 
 
-def _logs() -> list[Seed]:
-    time = np.arange(0, 90, 1.0)
-    speed = 12 * np.sin(np.pi * time / 89) ** 2
-    read = ("cycles", "import")
-    table = lambda head, form, *columns: (  # noqa: E731
-        head + "\n" + "\n".join(form.format(*row) for row in zip(*columns, strict=True)) + "\n"
-    ).encode()
-    texts = {
-        "fastsim.csv": table("cycSecs,cycMps,cycGrade", "{:g},{:.4f},{:.3f}", time, speed, 0 * time + 0.01),
-        "vecto.vdri": table("<t>,<v>,<grad>", "{:g},{:.3f},{:.2f}", time, speed * 3.6, 0 * time),
-        "vecto_s.vdri": table("<s>,<v>,<stop>,<grad>", "{:g},{:.3f},{:g},{:.2f}", time * 10,
-                              np.clip(speed * 3.6, 1, None), 0 * time, 0 * time),
-        "excel.csv": table("Zeit [s];Geschwindigkeit [km/h]", "{:g};{:.2f}", time, speed * 3.6).replace(b".", b","),
-        "units_row.tsv": table("time\tspeed\ns\tmph", "{:g}\t{:.3f}", time, speed / 0.44704),
-        "dynaprog.csv": table("time_s,speed_kmh", "{:.1f},{:.3f}", time + 0.1 * np.sin(time), speed * 3.6),
-    }  # fmt: skip
-    from openpyxl import Workbook
-    from scipy.io import savemat
-
-    book, stream = Workbook(), io.BytesIO()
-    book.active.append(["time [s]", "speed [km/h]"])
-    for pair in zip(time.tolist(), (speed * 3.6).tolist(), strict=True):
-        book.active.append(list(pair))
-    book.save(stream)
-    texts["log.xlsx"] = stream.getvalue()
-    stream = io.BytesIO()
-    savemat(stream, {"cyc_mph": np.column_stack([time, speed / 0.44704])})
-    texts["log.mat"] = stream.getvalue()
-    return [
-        Seed(name, text, ((*read, name, "--out", "o.csv"), (*read, name, "--repair", "--out", "o.csv")))
-        for name, text in texts.items()
-    ]  # fmt: skip
-
-
-def _maps() -> list[Seed]:
-    rpm, torque = np.meshgrid(np.arange(800, 4801, 400.0), np.arange(0, 251, 25.0), indexing="ij")
-    rpm, torque = rpm.ravel(), torque.ravel()
-    fuel_gps = (0.05 + torque * rpm / 9549.3 * 0.06) * 1.0
-    engine = "speed [rpm],torque [Nm],fuel [g/s],nox [g/s]\n" + "".join(
-        f"{n:g},{t:g},{f:.4f},{f * 0.01:.5f}\n"
-        for n, t, f in zip(rpm, torque, fuel_gps, strict=True)
+def _with_measured_maps() -> list[tuple[str, bytes]]:
+    """The shipped engine and a machine with maps in place of their coefficients."""
+    rpm, torque = [800.0, 2000.0, 3500.0, 5000.0], [0.0, 60.0, 150.0, 290.0]
+    fuel = [[0.05 + t * n * 7e-6 for t in torque] for n in rpm]
+    engine = _without(
+        (COMPONENTS / "engine_diesel_1600.toml").read_text(),
+        ("fuel_coefficients", "nox_coefficients"),
     )
-    loss = 50 + 0.003 * rpm + 0.2 * (torque / 3) ** 2
-    machine = "speed [rpm],torque [Nm],loss [W]\n" + "".join(
-        f"{n:g},{t / 3:.3f},{w:.3f}\n" for n, t, w in zip(rpm, torque, loss, strict=True)
-    )
-    words = lambda name, kind, like: (  # noqa: E731
-        ("maps", "import", name, "--kind", kind, "--like", like, "--out", "part.toml"),
-    )
-    return [
-        Seed("engine.csv", engine.encode(), words("engine.csv", "engine", "engine_diesel_1600")),
-        Seed("machine.csv", machine.encode(), words("machine.csv", "machine", "machine_flywheel_18kw")),
-    ]  # fmt: skip
+    engine += f"""
+[fuel_map]
+speed_rpm = {rpm}
+torque_nm = {torque}
+fuel_gps = {fuel}
+nox_gps = {[[x / 100 for x in row] for row in fuel]}
+motoring_torque_nm = [-15.0, -20.0, -30.0, -45.0]
+"""
+    machine = """name = "measured machine"
+kind = "map"
+power_max_w = 15e3
+torque_max_nm = 60.0
+speed_max_rpm = 18000.0
+inertia_kgm2 = 0.01
+[loss_map]
+speed_rpm = [0.0, 6000.0, 18000.0]
+torque_nm = [0.0, 20.0, 60.0]
+loss_w = [[10.0, 60.0, nan], [60.0, 150.0, 900.0], [300.0, 500.0, nan]]
+symmetric = true
+"""
+    return [("engine_measured", engine.encode()), ("machine_measured", machine.encode())]
 
 
-def _coastdowns() -> list[Seed]:
-    lines = ["time [s],speed [km/h],run,direction"]
-    for run in range(4):
-        speed, time = 33.0, 0.0
-        while speed > 4:
-            lines.append(f"{time:g},{speed * 3.6:.3f},{run + 1},{'ab'[run % 2]}")
-            speed -= (120 + 2 * speed + (0.4 + 0.01 * run) * speed**2) / 1400
-            time += 1.0
-    words = ("coastdown", "runs.csv", "--mass-kg", "1350", "--out", "car.toml")
-    return [Seed("runs.csv", ("\n".join(lines) + "\n").encode(), (words,))]
+def _without(text: str, tables: Sequence[str]) -> str:
+    """TOML without some tables."""
+    parts = re.split(r"(?m)^(?=\[)", text)
+    return "".join(part for part in parts if part[1 : part.find("]")] not in tables)
 
 
 def _studies() -> list[Seed]:
@@ -121,9 +82,10 @@ def _studies() -> list[Seed]:
 architectures = ["A", "C2"]
 strategies = ["conventional"]
 nox_weight = 5.0
+mass_kg = 1350
 [set]
 "battery.soc.start" = 0.55
-"car.mass_kg" = 1400
+"engine.scale.torque" = 1.1
 """
     sweep = f"""architecture = "C2"
 cycles = ["{SHORT_CYCLE}"]
@@ -132,6 +94,7 @@ constraints = ["battery.cells_in_series * 730 >= machine.power_max_w"]
 [parameters]
 battery.cells_in_series = {{ from = 32, to = 64, count = 2 }}
 machine.power_max_w = {{ from = 8e3, to = 3e4, count = 2, log = true }}
+engine = ["engine_diesel_1600", "engine_diesel_1600_steep_nox"]
 nox_weight = [0, 10]
 [sample]
 method = "sobol"

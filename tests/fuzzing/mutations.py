@@ -6,6 +6,13 @@ from collections.abc import Callable
 
 Mutation = Callable[[bytes, random.Random], bytes]
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
+_QUOTED = re.compile(rb"\"[^\"\n]*\"|'[^'\n]*'")
+_LIST = re.compile(rb"= \[([^\[\]\n]+)\]")
+# Files of the corpus, and names and folders that are something else than what was named.
+_NAMES = (
+    "./study.toml", "./sweep.toml", "./car.toml", "./part.toml", "./drive.csv", "engine.csv", "./log.mat", ".",
+    "..", "/", "/dev/null", "C2", "A", "nedc", "engine_diesel_1600", "battery_liion_64", "bound", "dp", "all",
+)  # fmt: skip
 _ODD_NUMBERS = (
     b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"1e-320", b"9" * 400, b"0x1F", b"1_000", b"1,5", b"--3",
     b"", b"true", b"-0.0", b"1e99999", b"18446744073709551616", "١٢".encode(), b"=1+1",
@@ -133,10 +140,43 @@ def line_of_100_megabytes(data: bytes, rng: random.Random) -> bytes:
     return line_very_long(data, rng, 99_000_000)
 
 
+def name_replaced(data: bytes, rng: random.Random) -> bytes:
+    """A text in quotes becomes the name of some file, perhaps of the spoilt one itself."""
+    places = list(_QUOTED.finditer(data))
+    if not places:
+        return data
+    place = rng.choice(places)
+    name = b'"' + rng.choice(_NAMES).encode() + b'"'
+    return data[: place.start()] + name + data[place.end() :]
+
+
+def entries_repeated(data: bytes, rng: random.Random) -> bytes:
+    """The entries of a list on one line, two or thousands of times."""
+    places = [found for found in _LIST.finditer(data) if len(found[1]) < 10_000]
+    if not places:
+        return data
+    place = rng.choice(places)
+    entries = b", ".join([place[1].rstrip(b", ")] * rng.choice((2, 3, 5000)))
+    return data[: place.start(1)] + entries + data[place.end(1) :]
+
+
+def column_blanked(data: bytes, rng: random.Random) -> bytes:
+    """Some lines lose what they have in one column."""
+    separator, column = max((b",", b";", b"\t"), key=data.count), rng.randrange(5)
+    lines = data.split(b"\n")
+    first = rng.randrange(len(lines))
+    for n in range(first, min(first + rng.choice((1, 5, 1000)), len(lines))):
+        cells = lines[n].split(separator)
+        if column < len(cells):
+            cells[column] = b""
+            lines[n] = separator.join(cells)
+    return b"\n".join(lines)
+
+
 COMMON: tuple[Mutation, ...] = (
     truncated, bits_flipped, number_replaced, number_scaled, text_inserted, lines_shuffled, lines_removed,
     lines_repeated, columns_swapped, column_removed, other_separator, other_line_ends, other_encoding, emptied,
-    binary, nested_deeply, line_very_long,
+    binary, nested_deeply, line_very_long, name_replaced, entries_repeated, column_blanked,
 )  # fmt: skip
 # Once in so many cases, because each takes seconds to write and read.
 RARE: tuple[Mutation, ...] = (line_of_100_megabytes,)

@@ -16,9 +16,10 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fuzzing.corpus import SHORT_CYCLE, Seed, seeds
+from fuzzing.corpus import seeds
 from fuzzing.mutations import COMMON, RARE, RARE_EVERY
 from fuzzing.runner import fault_of, run
+from fuzzing.seed import SHORT_CYCLE, Seed
 
 
 def spoilt(
@@ -44,7 +45,8 @@ def fuzz(seed: int, cases: range, keep: Path | None, *, rare: bool) -> tuple[lis
         good, contents, words, how = spoilt(seed, case, files, rare=rare)
         with tempfile.TemporaryDirectory(prefix="hevopt-fuzz-") as name:
             folder = Path(name)
-            (folder / good.name).write_bytes(contents)
+            for other, whole in {**good.beside, good.name: contents}.items():
+                (folder / other).write_bytes(whole)
             seen = run(words, folder)
             statuses[f"{words[0]} {seen.status}"] += 1
             fault = fault_of(seen)

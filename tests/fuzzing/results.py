@@ -1,0 +1,56 @@
+"""Good files that hevopt itself wrote: a saved comparison, packed and plain, and the store of a sweep."""
+
+import gzip
+import tempfile
+from pathlib import Path
+
+from fuzzing.seed import SHORT_CYCLE, Seed
+
+_STUDY = f"""architecture = "C2"
+cycles = ["{SHORT_CYCLE}"]
+strategies = ["bound"]
+[parameters]
+machine.power_max_w = [1e4, 2e4]
+nox_weight = [0, 10]
+"""
+
+
+def results() -> list[Seed]:
+    """A saved comparison and a store, each with what reads it."""
+    packed = _saved()
+    return [
+        Seed("saved.json.gz", packed, (("report", "saved.json.gz", "--out", "page.html"),)),
+        Seed("saved.json", gzip.decompress(packed), (("report", "saved.json", "--out", "page.html"),)),
+        Seed("sweep.sqlite", _store(), (
+            ("report", "sweep.sqlite", "--out", "page.html"), ("sweep", "--status", "sweep.sqlite"),
+            ("sweep", "--store", "sweep.sqlite", "--export", "cases.csv"),
+        )),
+    ]  # fmt: skip
+
+
+def _saved() -> bytes:
+    from hevopt import compare
+    from hevopt.pages.collect import Collector
+
+    collector = Collector()
+    comparison = compare(
+        SHORT_CYCLE, ["A", "C2"], ["ecms"], observe=collector.observe, allow_shortfall=True
+    )
+    return collector.results(comparison, "hevopt compare").packed()
+
+
+def _store() -> bytes:
+    from hevopt.sweeps.run import begin, plan_of
+    from hevopt.sweeps.store import open_store
+    from hevopt.sweeps.study_file import read_study
+    from hevopt.sweeps.work import run_job
+
+    with tempfile.TemporaryDirectory(prefix="hevopt-fuzz-") as name:
+        study, path = Path(name) / "sweep.toml", Path(name) / "sweep.sqlite"
+        study.write_text(_STUDY)
+        plan = plan_of(read_study(study))
+        with open_store(path) as store:
+            begin(plan, store, "hevopt sweep sweep.toml")
+            for job in plan.jobs:
+                store.add(run_job(job))
+        return path.read_bytes()
