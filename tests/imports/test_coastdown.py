@@ -441,3 +441,12 @@ def test_winds_that_differ_by_run_are_taken_out_without_bias():
     expected = constant - (e**2 - variance_of_e) / (4 * TRUTH[2])
     assert variance_of_e / (4 * TRUTH[2]) > 0.5
     assert fit.coefficients[0] == pytest.approx(expected, abs=0.01)
+
+
+def test_of_hundreds_of_columns_a_message_names_the_first(hevopt):
+    Path("runs.csv").write_text(
+        "\n".join([",".join(f"x{n}" for n in range(500)), "1," * 499 + "1"])
+    )
+    seen = hevopt("coastdown", "runs.csv", "--mass-kg", "1350", "--like", "car_compact")
+    assert seen.status == 2 and "no column of time" in seen.err and " more" in seen.err
+    assert len(seen.err) < 1000
