@@ -1,11 +1,11 @@
 """What an architecture's file may hold: the components it names, its functions and the coupling."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, Discriminator, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Discriminator, Field, model_validator
 
 from hevopt.datafile import FileModel
-from hevopt.file_fields import Description, Fraction, Name, Named, Ratio, Table
+from hevopt.file_fields import Description, Fraction, KeysOfKind, Name, Named, Ratio, Table
 
 Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
 CouplingKind = Literal[
@@ -21,13 +21,29 @@ def _names_a_file(table: dict[str, Any]) -> dict[str, Any]:
 
 # A component: the name or path of its file, or a table {file, ...} whose other keys replace the file's.
 Component = Annotated[
-    Annotated[str, Named] | Annotated[dict[str, Any], AfterValidator(_names_a_file), Table],
+    Annotated[str, Field(min_length=1), Named]
+    | Annotated[dict[str, Any], AfterValidator(_names_a_file), Table],
     Discriminator(lambda value: "a table" if isinstance(value, dict) else "a name"),
 ]
 
 
+_KEYS_OF_KIND = KeysOfKind(
+    {kind: set() for kind in get_args(CouplingKind)}
+    | {
+        "gearbox_input": {"second_clutch"},
+        "gearbox_output": {"machine_ratio", "machine_efficiency"},
+    },
+    {
+        "gearbox_output": {"disconnects_above_speed_max"},
+        "even_shaft": {"machine_shift_fuel_g"},
+    },
+)
+
+
 class CouplingFile(FileModel):
     """How the machine joins the shafts."""
+
+    model_config = ConfigDict(json_schema_extra=_KEYS_OF_KIND.schema())
 
     kind: CouplingKind
     second_clutch: bool | None = None
@@ -38,19 +54,7 @@ class CouplingFile(FileModel):
 
     @model_validator(mode="after")
     def _keys_of_kind(self):
-        needed = {
-            "gearbox_input": {"second_clutch"},
-            "gearbox_output": {"machine_ratio", "machine_efficiency"},
-        }.get(self.kind, set())
-        allowed = {
-            "gearbox_output": needed | {"disconnects_above_speed_max"},
-            "even_shaft": {"machine_shift_fuel_g"},
-        }.get(self.kind, needed)
-        given = self.model_fields_set - {"kind"}
-        if missing := needed - given:
-            raise ValueError(f"kind {self.kind!r} needs {', '.join(sorted(missing))}")
-        if extra := given - allowed:
-            raise ValueError(f"kind {self.kind!r} does not use {', '.join(sorted(extra))}")
+        _KEYS_OF_KIND.check(self.kind, self.model_fields_set)
         return self
 
 

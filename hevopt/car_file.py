@@ -1,15 +1,29 @@
 """What a car's file may hold: mass, wheels, auxiliaries and road load."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from hevopt.datafile import FileModel
 from hevopt.file_fields import AuxiliaryPower, Coefficient, Mass, Name
 
+_FORMS = ({"rolling_c0", "drag_area_m2"}, {"coastdown_c0_n"})
+
+
+def _one_form(schema: dict[str, Any]) -> None:
+    """What a schema says of the two forms: the keys of one, and none of the other."""
+    coastdown = [key for key in schema["properties"] if key.startswith("coastdown")]
+    parts = [key for key in schema["properties"] if key not in coastdown]
+    schema["oneOf"] = [
+        {"required": sorted(needed), "properties": dict.fromkeys(others, False)}
+        for needed, others in zip(_FORMS, (coastdown, parts), strict=True)
+    ]
+
 
 class RoadLoadFile(FileModel):
     """Rolling and air resistance, equations (5) to (10), or coast-down coefficients (12) with their mass."""
+
+    model_config = ConfigDict(json_schema_extra=_one_form)
 
     rolling_c0: Annotated[float, Field(ge=0, le=0.2)] | None = None
     rolling_c1_spm: Coefficient = 0.0
@@ -26,7 +40,7 @@ class RoadLoadFile(FileModel):
     def _one_form(self):
         coastdown = {key for key in self.model_fields_set if key.startswith("coastdown")}
         parts = self.model_fields_set - coastdown
-        whole = {"rolling_c0", "drag_area_m2"} <= parts or "coastdown_c0_n" in coastdown
+        whole = _FORMS[0] <= parts or _FORMS[1] <= coastdown
         if not whole or (coastdown and parts):
             raise ValueError(
                 "give either rolling_c0 and drag_area_m2, or coastdown_c0_n, and no key of the other "

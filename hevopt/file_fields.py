@@ -3,10 +3,12 @@
 Keys carry their unit as a suffix; bounds are wide where physics sets none, and keep arithmetic from overflowing.
 """
 
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from hevopt.datafile import SHAPES, FileModel, shape_of
 
@@ -52,8 +54,44 @@ def check_grid(name: str, grid: list[list[float]], rows: int, columns: int) -> N
         raise ValueError(f"{name}: allowed: 0 to {_MAP_MAX:g}, or nan where not measured")
 
 
+@dataclass(frozen=True)
+class KeysOfKind:
+    """Which keys go with which `kind` of a table: kind -> keys that it needs, and those it may have besides."""
+
+    needed: Mapping[str, set[str]]
+    besides: Mapping[str, set[str]]
+
+    def check(self, kind: str, given: set[str]) -> None:
+        """ValueError where a table lacks a key of its kind or has one of another."""
+        if missing := self.needed[kind] - given:
+            raise ValueError(f"kind {kind!r} needs {', '.join(sorted(missing))}")
+        if extra := given & self._of_others(kind):
+            raise ValueError(f"kind {kind!r} does not use {', '.join(sorted(extra))}")
+
+    def schema(self) -> dict[str, Any]:
+        """The same as part of a JSON Schema."""
+        return {
+            "allOf": [
+                {
+                    "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
+                    "then": {
+                        "required": sorted(needed),
+                        "properties": dict.fromkeys(sorted(self._of_others(kind)), False),
+                    },
+                }
+                for kind, needed in self.needed.items()
+            ]
+        }
+
+    def _of_others(self, kind: str) -> set[str]:
+        every = set().union(*self.needed.values(), *self.besides.values())
+        return every - self.needed[kind] - self.besides.get(kind, set())
+
+
 class ScaleFile(FileModel):
     """Another size of the same design: one factor, called by any of its names; the law is in scaling.py."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     torque: ScaleFactor | None = None
     power: ScaleFactor | None = None

@@ -20,13 +20,8 @@ from hevopt.machine_file import MachineFile
 # A component in an architecture: its file, or its file and keys in place of the file's.
 _NAMED = {
     "type": "string",
+    "minLength": 1,
     "description": "a name, looked up in components/ beside the file and then among the shipped ones, or a path",
-}
-_CHANGED = {
-    "type": "object",
-    "description": "the file, and keys that replace the file's",
-    "properties": {"file": _NAMED},
-    "required": ["file"],
 }
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 MODELS: dict[str, type[FileModel]] = {
@@ -45,6 +40,11 @@ def schema(kind: str | None = None) -> dict[str, Any]:
         raise unknown_name("kind of file", kind, list(MODELS))
     _, found = models_json_schema([(model, "validation") for model in MODELS.values()])
     tables = {name: _table(name, table) for name, table in found["$defs"].items()}
+    parts = {model.__name__ for key, model in MODELS.items() if key != "architecture"}
+    tables |= {
+        f"{name}Changed": _changed(table, {"file": _NAMED} if name in parts else {})
+        for name, table in tables.items()
+    }
     references = {key: {"$ref": f"#/$defs/{model.__name__}"} for key, model in MODELS.items()}
     title = f"hevopt {kind or 'architecture or component'} file"
     top = {"anyOf": list(references.values())} if kind is None else references[kind]
@@ -65,11 +65,35 @@ def _table(name: str, table: dict[str, Any]) -> dict[str, Any]:
             del found["default"]
         found.pop("title", None)
         if {"additionalProperties": True, "type": "object"} in found.get("oneOf", []):
-            found = {"oneOf": [_NAMED, _CHANGED]}
+            found = {"oneOf": [_NAMED, _file_and_changes(MODELS[key].__name__)]}
         keys[key] = {"description": f"{meaning} ({unit})" if unit.strip("-") else meaning} | found
         if unit:
             keys[key]["x-unit"] = unit
     return {k: v for k, v in table.items() if k != "title"} | {"properties": keys}
+
+
+def _file_and_changes(name: str) -> dict[str, Any]:
+    """A component's file, and keys that replace those of the file."""
+    return {
+        "type": "object",
+        "description": "the file, and keys that replace the file's",
+        "required": ["file"],
+        "allOf": [{"$ref": f"#/$defs/{name}Changed"}],
+    }
+
+
+def _changed(table: dict[str, Any], besides: dict[str, Any]) -> dict[str, Any]:
+    """The schema of what replaces keys of a table: none is needed, and what they are together the file decides."""
+    keys = {key: _changed_value(shape) for key, shape in table["properties"].items()}
+    return {"type": "object", "additionalProperties": False, "properties": {**besides, **keys}}
+
+
+def _changed_value(shape: dict[str, Any]) -> dict[str, Any]:
+    if "$ref" in shape:
+        return {**shape, "$ref": f"{shape['$ref']}Changed"}
+    if "oneOf" in shape:
+        return {**shape, "oneOf": [_changed_value(inner) for inner in shape["oneOf"]]}
+    return shape
 
 
 def _reached(name: str, tables: dict[str, Any]) -> list[str]:

@@ -3,12 +3,13 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from hevopt.datafile import FileModel
 from hevopt.file_fields import (
     Curve,
     Fraction,
+    KeysOfKind,
     Name,
     NotNegative,
     Positive,
@@ -42,7 +43,19 @@ class LossMapFile(FileModel):
         return self
 
 
+_KEYS_OF_KIND = KeysOfKind(
+    {
+        "loss": {"loss_c0_w", "loss_c1_ws", "loss_c2_ws2", "loss_c3_wpnm2"},
+        "efficiency": {"efficiency"},
+        "map": {"loss_map"},
+    },
+    {},
+)
+
+
 class MachineFile(FileModel):
+    model_config = ConfigDict(json_schema_extra=_KEYS_OF_KIND.schema())
+
     name: Name
     kind: Literal["loss", "efficiency", "map"]
     power_max_w: Positive
@@ -59,17 +72,6 @@ class MachineFile(FileModel):
 
     @model_validator(mode="after")
     def _keys_of_kind(self):
-        losses = [self.loss_c0_w, self.loss_c1_ws, self.loss_c2_ws2, self.loss_c3_wpnm2]
-        if self.kind == "loss" and (None in losses or self.efficiency is not None):
-            raise ValueError(
-                "kind 'loss' needs loss_c0_w, loss_c1_ws, loss_c2_ws2, loss_c3_wpnm2 and no efficiency"
-            )
-        if self.kind == "efficiency" and (self.efficiency is None or any(losses)):
-            raise ValueError("kind 'efficiency' needs efficiency and no loss_c*")
-        if self.kind == "map" and (
-            any(v is not None for v in losses) or self.efficiency is not None
-        ):
-            raise ValueError("kind 'map' needs the table [loss_map], and no efficiency or loss_c*")
-        if (self.kind == "map") != (self.loss_map is not None):
-            raise ValueError("the table [loss_map] goes with kind 'map'")
+        given = {key for key in self.model_fields_set if getattr(self, key) is not None}
+        _KEYS_OF_KIND.check(self.kind, given)
         return self

@@ -168,6 +168,13 @@ def test_shipped_files_agree_with_the_schema(path, kind):
         ("car", "mass_kg", 20), ("car", "mass", 1300), ("engine", "idle_rpm", "slow"), ("car", "road_load", None),
         ("machine", "kind", "magic"), ("battery", "cells_in_series", 1.5), ("engine", "scale", {"power": 0}),
         ("architecture", "engine", {"idle_rpm": 800}), ("battery", "resistance_ohm", [-1.0]),
+        ("engine", "scale", {}), ("engine", "scale", {"power": 1.1, "torque": 1.1}), ("machine", "scale", {}),
+        ("machine", "kind", "map"), ("machine", "kind", "efficiency"), ("machine", "efficiency", 0.9),
+        ("architecture", "coupling", {"kind": "gearbox_input"}), ("car", "name", ""),
+        ("architecture", "coupling", {"kind": "belt", "machine_ratio": 2.0}), ("architecture", "engine", ""),
+        ("architecture", "coupling", {"kind": "gearbox_output", "machine_ratio": 2.0}),
+        ("car", "road_load", {"rolling_c0": 0.01}), ("car", "road_load", {"coastdown_c1_nspm": 1.0}),
+        ("car", "road_load", {"rolling_c0": 0.01, "drag_area_m2": 0.7, "coastdown_c0_n": 100.0}),
     ],
 )  # fmt: skip
 def test_the_schema_refuses_what_the_reader_refuses(kind, key, value):
@@ -183,13 +190,29 @@ def test_the_schema_refuses_what_the_reader_refuses(kind, key, value):
         MODELS[kind].model_validate({**contents, key: value})
 
 
+def test_the_schema_knows_what_a_component_may_have_changed():
+    contents = tomllib.loads((SHIPPED / "C2.toml").read_text(encoding="utf-8"))
+    checker = jsonschema.Draft202012Validator(schema("architecture"))
+    for key, table, good in [
+        ("engine", {"fuel": {"density_kgpl": 0.8}, "scale": {"power": 1.1}}, True),
+        ("car", {"mass_kg": 1300, "road_load": {"drag_area_m2": 0.6}}, True),
+        ("engine", {"idel_rpm": 800}, False),
+        ("engine", {"fuel": {"density": 0.8}}, False),
+        ("engine", {"fuel": {"file": "x"}}, False),
+        ("car", {"mass_kg": 20}, False),
+    ]:
+        named = {"file": contents[key], **table}
+        assert checker.is_valid({**contents, key: named}) == good, table
+
+
 def test_every_key_has_a_unit_a_meaning_and_a_place_in_the_schema(monkeypatch, capsys):
     status, out, _ = call(monkeypatch, capsys, "architectures", "schema")
     assert status == 0
     printed = json.loads(out)
     assert printed["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     tables = printed["$defs"]
-    assert {name: set(table["properties"]) for name, table in tables.items()} == {
+    whole = {name: table for name, table in tables.items() if not name.endswith("Changed")}
+    assert {name: set(table["properties"]) for name, table in whole.items()} == {
         name: set(keys) for name, keys in MEANINGS.items()
     }
     mass = tables["CarFile"]["properties"]["mass_kg"]
