@@ -143,7 +143,8 @@ def test_a_symmetric_map_loses_the_same_at_the_opposite_torque(tmp_path):
             "[loss_map]\nspeed_rpm = [0, 1]\ntorque_nm = [-1, 1]\nloss_w = [[0, 1], [1, 2]]\nsymmetric = true\n",
             "needs torque_nm from 0 up",
         ),
-        ("loss_c0_w = 9\n[loss_map]\nspeed_rpm = [0, 1]\ntorque_nm = [0, 1]\nloss_w = [[0, 1], [1, 2]]\n", "does not use"),
+        ("loss_c0_w = 9\n[loss_map]\nspeed_rpm = [0, 1]\ntorque_nm = [0, 1]\nloss_w = [[0, 1], [1, 2]]\n",
+         "kind 'map' does not use loss_c0_w"),
     ],
 )  # fmt: skip
 def test_a_wrong_loss_map_is_one_clear_message(tmp_path, loss_map, said):

@@ -203,7 +203,7 @@ def _solved(row: Mapping[str, Any]) -> Solved:
         row["strategy"],
         row["objective_bound_l_per_100km"],
         row["fuel_corrected_l_per_100km"],
-        nan if row["nox_mg_per_km"] is None else row["nox_mg_per_km"],
+        nan if row.get("nox_mg_per_km") is None else row["nox_mg_per_km"],
         row["status"],
     )
 

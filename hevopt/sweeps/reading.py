@@ -1,12 +1,11 @@
 """Reading a store: while a sweep writes to it, after one was killed, on a disk that cannot be written."""
 
-import json
 import os
 import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,8 +13,8 @@ from typing import Any
 from hevopt.errors import DataError
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.store import check_kind, told
+from hevopt.sweeps.stored import OUTCOMES, check_case, check_meta, check_pruned, loaded
 
-OUTCOMES = ("ok", "infeasible", "failed", "pruned", "missing")
 _RECORDS = """
 SELECT plan.design, designs.parameters, plan.cycle, plan.strategy, plan.nox_weight,
        CASE WHEN cases.status IS NOT NULL THEN cases.status WHEN pruned.design IS NOT NULL THEN 'pruned'
@@ -50,7 +49,9 @@ class Reader:
     def meta(self) -> dict[str, str]:
         """What is known of the sweep: study (its text), command, created, begun ..."""
         with told(self.path):
-            return dict(self.connection.execute("SELECT name, value FROM meta"))
+            meta = dict(self.connection.execute("SELECT name, value FROM meta"))
+        check_meta(self.path, meta)
+        return meta
 
     def statuses(self) -> dict[str, str]:
         """Key -> status of all cases that have a result."""
@@ -73,15 +74,24 @@ class Reader:
         """Every case of the plan, by design, cycle and strategy."""
         query = f"{_RECORDS} ORDER BY plan.design, plan.cycle, plan.strategy"
         with told(self.path):
-            for design, parameters, *middle, row, error, seconds in self.connection.execute(query):
-                values = None if row is None else json.loads(row)
-                yield Record(design, json.loads(parameters), *middle, values, error, seconds)
+            names = [field.name for field in fields(Record)]
+            keys = None
+            for found in self.connection.execute(query):
+                values = dict(zip(names, found, strict=True))
+                for name in ("parameters", "row"):
+                    values[name] = loaded(self.path, values[name])
+                check_case(self.path, values, keys)
+                keys = values["parameters"]
+                yield Record(**values)
 
     def pruned(self) -> list[Pruned]:
         """The designs discarded unsolved, by number."""
         query = "SELECT design, bound, incumbent, objective FROM pruned ORDER BY design"
         with told(self.path):
-            return [Pruned(*found) for found in self.connection.execute(query)]
+            pruned = [Pruned(*found) for found in self.connection.execute(query)]
+        for one in pruned:
+            check_pruned(self.path, asdict(one))
+        return pruned
 
 
 @contextmanager

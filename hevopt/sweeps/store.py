@@ -25,6 +25,7 @@ from typing import Any
 from hevopt.errors import DataError
 from hevopt.sweeps.jobs import Outcome, Planned
 from hevopt.sweeps.prune import Pruned
+from hevopt.sweeps.stored import loaded
 from hevopt.writing import check_writable
 
 SCHEMA = 1
@@ -119,7 +120,7 @@ class Store:
         with told(self.path):
             for key in keys:
                 found = self._connection.execute(query, (key,)).fetchone()
-                yield key, json.loads(found[0]) if found else None
+                yield key, loaded(self.path, found[0]) if found else None
 
     def close(self) -> None:
         """Write what was taken, and leave one file."""

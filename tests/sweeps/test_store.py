@@ -22,8 +22,13 @@ DESIGNS = [(0, {"a": 0.1, "nox_weight": 0}), (1, {"a": 0.2, "nox_weight": 0})]
 PLAN = [Planned(n, "nedc", s, 0.0, f"{n}{s}") for n in (1, 0) for s in ("ecms", "dp")]
 
 
+def row(figure):
+    return {"strategy": "dp", "status": "ok", "fuel_l_per_100km": figure, "fuel_corrected_l_per_100km": figure,
+            "objective_l_per_100km": figure, "bound_l_per_100km": figure}  # fmt: skip
+
+
 def ok(key, figure=1 / 3):
-    return Outcome(key, "ok", {"strategy": "dp", "fuel_l_per_100km": figure}, None, 0.5)
+    return Outcome(key, "ok", row(figure), None, 0.5)
 
 
 def filled(path, outcomes):
@@ -46,7 +51,7 @@ def test_what_is_stored_is_read_to_the_last_bit_in_the_order_of_designs(tmp_path
     assert [(r.design, r.strategy, r.outcome) for r in found] == [
         (0, "dp", "missing"), (0, "ecms", "ok"), (1, "dp", "failed"), (1, "ecms", "infeasible"),
     ]  # fmt: skip
-    assert found[1].row == {"strategy": "dp", "fuel_l_per_100km": 0.1 + 0.2}
+    assert found[1].row == row(0.1 + 0.2)
     assert found[2].error == "no; 'quoted'\n" and found[2].seconds == 2.0
     assert found[0].parameters == {"a": 0.1, "nox_weight": 0}
     assert list(tmp_path.iterdir()) == [path]
@@ -213,3 +218,26 @@ def test_a_second_sweep_is_refused_by_name_and_a_killed_one_leaves_no_lock(tmp_p
     with locked(path), pytest.raises(DataError, match=str(os.getpid())), locked(path):
         pass
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "UPDATE cases SET row = substr(row, 1, 40)",
+        "UPDATE cases SET row = replace(row, 'status', 'statuz')",
+        "UPDATE cases SET row = replace(row, '\"ok\"', '7')",
+        "UPDATE cases SET seconds = 'x'",
+        "UPDATE designs SET parameters = '[1]'",
+        "UPDATE designs SET parameters = '{\"b\": 1}' WHERE number = 1",
+        "INSERT INTO pruned VALUES (1, 'x', 0, 1.0)",
+        "INSERT INTO meta VALUES ('versions', '{')",
+    ],
+)
+def test_a_damaged_store_is_one_message(tmp_path, damage):
+    path = filled(tmp_path / "s.sqlite", [ok("0dp")])
+    connection = sqlite3.connect(path)
+    connection.execute(damage)
+    connection.commit()
+    connection.close()
+    with open_to_read(path) as reader, pytest.raises(DataError, match=r"s\.sqlite: damaged"):
+        list(reader.records()), reader.pruned(), reader.meta()
