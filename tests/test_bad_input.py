@@ -204,7 +204,7 @@ def test_harmless_oddities_of_a_cycle(hevopt, spoilt):
         ("x", '"car_compact"', "5", ["car = 5", "text in quotes"]),
         ("x", '"car_compact"', '"car_compct"', ["x.toml, car:", "close matches: car_compact;"]),
         ("x", '"car_compact"', '"no/car.toml"', ["x.toml, car:", "no/car.toml does not exist"]),
-        ("x", '"car_compact"', '""', ["x.toml, car:", "'' is empty"]),
+        ("x", '"car_compact"', '""', ["x.toml: car = ''", "1 or more characters"]),
         ("x", '"car_compact"', '"x.toml"', ["mass_kg is missing", "unknown key coupling"]),
         ("car", "1300.0", "0", ["mass_kg = 0; allowed: 50 to 100000"]),
         ("car", "1300.0", "1e308", ["mass_kg = 1e+308", "100000"]),
