@@ -6,7 +6,7 @@ import pytest
 from fuzzing.run import fuzz
 from fuzzing.runner import Seen, fault_of, run
 
-CASES = range(60)
+CASES = range(40)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="forks")
