@@ -210,11 +210,11 @@ def calibration_table(plan: Plan) -> Table | None:
     members: list[Mapping[str, Any]] = plan.notes.get("calibration", [])
     if len(members) < 2:
         return None
-    title = "calibration: * the member taken"
+    title = "calibration: * taken; passed over: the end charge is worth more than 1 % of the cost"
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     capped = "nox_cap_kgps" in members[0]
     heads = ["electric below kW", *(["NOx cap mg/s"] if capped else []), "cost kg", "corrected kg",
-             "NOx g", "end surplus kJ", "neutral", ""]  # fmt: skip
+             "NOx g", "end surplus kJ", "passed over", ""]  # fmt: skip
     for head in heads:
         table.add_column(head, justify="right")
     for n, member in enumerate(members):
@@ -223,7 +223,7 @@ def calibration_table(plan: Plan) -> Table | None:
             f"{member['threshold_w'] / 1e3:.2f}", *cap,
             f"{member['cost_kg']:.5f}", f"{member['corrected_kg']:.5f}",
             f"{member['nox_kg'] * 1e3:.3f}", f"{member['surplus_j'] / 1e3:+.1f}",
-            "yes" if member["neutral"] else "no", "*" if n == plan.notes["chosen"] else "",
+            "" if member["eligible"] else "yes", "*" if n == plan.notes["chosen"] else "",
         )  # fmt: skip
     return table
 

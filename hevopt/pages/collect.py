@@ -35,6 +35,7 @@ from hevopt.pages.results import (
 from hevopt.problem import Plan, Trajectory
 from hevopt.provenance import files_digests, versions
 from hevopt.published import published_beside
+from hevopt.rows import NEUTRAL_PERCENT
 from hevopt.rows import Row as StudyRow
 from hevopt.simulation import simulate
 from hevopt.strategies import STRATEGIES
@@ -217,11 +218,18 @@ def _calibration(case: Case, notes: Mapping[str, Any]) -> list[Member]:
             corrected_l_per_100km=litres(member["corrected_kg"]),
             nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m if nox_known else None,
             surplus_j=member["surplus_j"],
-            neutral=bool(member["neutral"]),
+            neutral=member["inside"] and _is_neutral(case, member),
             chosen=n == notes["chosen"],
         )
         for n, member in enumerate(members)
     ]
+
+
+def _is_neutral(case: Case, member: Mapping[str, Any]) -> bool:
+    """As for rows; the calibration itself asks for less."""
+    fuel_kg = member["cost_kg"] - case.problem.nox_weight * member["nox_kg"]
+    fuel_j = fuel_kg * case.car.engine.heating_value_jpkg
+    return 100 * abs(member["surplus_j"]) <= NEUTRAL_PERCENT * fuel_j
 
 
 def _trouble(notes: Mapping[str, Any]) -> list[str]:

@@ -4,35 +4,40 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from hevopt.published import HYBRIDS, STATEMENTS, Statement
-from hevopt.reproduction.cases import (
-    CUTS_PERCENT,
-    Balance,
-    Member,
-    Reproduction,
-    least_penalty,
-)
+from hevopt.reproduction.cases import CUTS_PERCENT, Reproduction
+from hevopt.reproduction.energies import Balance
+from hevopt.reproduction.members import Member, least_penalty
 from hevopt.reproduction.verdicts import markdown, signed
 
 # Points of fuel within which members of a curve count as equals.
 _NEAR_LEAST_FUEL = 2.0
+_NOT_ENERGIES = ("engine_efficiency_percent", "fuel_l_per_100km")
 
 
 def balances(found: Reproduction) -> str:
-    """Energies of every car, and what of the braking is recovered."""
-    names = [name.replace("_", " ") for name in Balance._fields[:-1]]
-    heads = ["kJ/km", *names, "engine efficiency, %", "recovered of braking, %"]
+    """Energies of every car, what of the braking is recovered, and the fuel that it comes to."""
+    energies = [name for name in Balance._fields if name not in _NOT_ENERGIES]
+    heads = ["kJ/km", *(name.replace("_", " ") for name in energies), "engine efficiency, %",
+             "recovered of braking, %", "fuel, l/100 km"]  # fmt: skip
     rows = []
     for car, balance in found.balances.items():
         share = 100 * balance.recovered / balance.braking
-        energies = [f"{value:.0f}" for value in balance[:-1]]
-        rows.append([car, *energies, f"{balance.engine_efficiency:.1f}", f"{share:.0f}"])
+        cells = [_whole(getattr(balance, name)) for name in energies]
+        rows.append([car, *cells, f"{balance.engine_efficiency_percent:.1f}", f"{share:.0f}",
+                     f"{balance.fuel_l_per_100km:.3f}"])  # fmt: skip
     text = (
         "Where the energy of ours goes (A `baseline`, B `start_stop`, the others "
         "`conventional`). Traction and braking: at the wheels; recovered: taken by the battery "
-        "at its terminals meanwhile; idle fuel: burnt at standstill; engine efficiency: its mean "
-        "while it burns."
+        "at its terminals meanwhile; idle fuel: burnt at standstill, a part of the running fuel; "
+        "start fuel: that of engine starts beside it; end charge: what charge left beyond the "
+        "start's is worth in fuel; engine efficiency: its mean while it burns. Running and start "
+        "fuel less end charge are the fuel of the other tables, in the last column."
     )
     return text + "\n\n" + markdown(heads, "l" + "r" * (len(heads) - 1), rows)
+
+
+def _whole(value: float) -> str:
+    return f"{round(value):d}"  # an int has no -0
 
 
 def members_of(car: str, found: Reproduction) -> list[Member]:
@@ -57,7 +62,7 @@ def curves(found: Reproduction) -> str:
         "below which the car drives electrically, every kW. The calibration itself tries other, "
         f"finer thresholds; what it takes, the `conventional` of this page, is the last row ({at} kW)."
     )
-    passes = [f"- {s.cars[0]}: {_passes(found, s)}" for s in STATEMENTS[1:3]]
+    passes = [f"- {s.cars[0]}: {_passes(found, s)}" for s in STATEMENTS if s.section == 2]
     return "\n\n".join(
         [
             text,

@@ -1,8 +1,11 @@
 """The page of the reproduction, Markdown: every figure in it comes from a Reproduction, none is typed."""
 
+from collections.abc import Sequence
+
 from hevopt.published import (
     CYCLE,
     HYBRIDS,
+    MEAN_NOX,
     MEAN_NOX_WITHOUT_C1,
     STATEMENTS,
     WHEEL_WORK_MJPKM,
@@ -10,8 +13,10 @@ from hevopt.published import (
     percent,
 )
 from hevopt.reproduction import sections
-from hevopt.reproduction.cases import JOINT, NEUTRAL_WORTH_PERCENT, Reproduction, least_penalty
+from hevopt.reproduction import variations as v
+from hevopt.reproduction.cases import JOINT_ELECTRIC, K_AND_STEEP, Reproduction
 from hevopt.reproduction.details import members_of
+from hevopt.reproduction.members import least_penalty
 from hevopt.reproduction.verdicts import (
     driven,
     markdown,
@@ -22,10 +27,10 @@ from hevopt.reproduction.verdicts import (
     star,
     starred,
 )
+from hevopt.rows import NEUTRAL_PERCENT
 from hevopt.study import Comparison
 
 COMMAND = "hevopt reproduction --out reports/reproduction.md"
-_MEAN_NOX = STATEMENTS[4]
 
 
 def page(found: Reproduction) -> str:
@@ -47,7 +52,7 @@ def page(found: Reproduction) -> str:
 
 
 def _head() -> str:
-    share = f"{NEUTRAL_WORTH_PERCENT:g} %"
+    share = f"{NEUTRAL_PERCENT:g} %"
     whole, about = min(s.rounding for s in STATEMENTS), max(s.rounding for s in STATEMENTS)
     return f"""# The published study beside ours
 
@@ -62,20 +67,23 @@ Each section changes one assumption at a time, in A as well where A has it (A's 
 where that itself is changed), solves and calibrates everything afresh, and says what that moves.
 
 *Reached* means within the rounding of the published figure: {whole:g} points,
-or {about:g} where the text says "about". *Passed* means beyond it, so that less of the same change would reach it.
-What reaches a figure can explain it; that it does would need the study's own assumptions, which its text does not
-give. A star marks what is not neutral: its end charge is worth more than {share} of its fuel, or the charge left
-its window on the way. Fuel is corrected there as everywhere, NOx nowhere; under each table with stars, another says
-how far the end charge is above (+) or below (-) the start's and what the change is as driven, without correction.
+or {about:g} where the text says "about". *Passed* means beyond it: the published figure lies between ours and
+what the change makes of it. Whether less of the same change would reach it is not worked out; results may jump, as
+a rule takes another member of its family. What reaches a figure can explain it; that it does would need the study's
+own assumptions, which its text does not give.
+
+A star marks what is not neutral: its end charge is off by more than {share} of the fuel's energy, or the charge
+left its window on the way. Fuel is corrected there as everywhere, NOx nowhere; under each table with stars, another
+says how far the end charge is above (+) or below (-) the start's and what the change is as driven, not corrected.
 What as driven does not reach the published figure is *reached only after correction*."""
 
 
 def _points(found: Reproduction) -> str:
     rows = []
-    for statement, section in zip(STATEMENTS, sections.SECTION_OF, strict=True):
-        rows.append(_point(statement, statement.what, section, found))
-        if statement is _MEAN_NOX:
-            rows.append(_point(MEAN_NOX_WITHOUT_C1, "the same without C1", section, found))
+    for statement in STATEMENTS:
+        rows.append(_point(statement, statement.what, found))
+        if statement is MEAN_NOX:
+            rows.append(_point(MEAN_NOX_WITHOUT_C1, "the same without C1", found))
     work = found.work_mjpkm["A as shipped"]
     same = round(work, 1) == WHEEL_WORK_MJPKM
     off = "within rounding" if same else f"{signed(work - WHEEL_WORK_MJPKM, 3)} MJ/km"
@@ -92,8 +100,8 @@ def _link(section: int) -> str:
     return f"[{sections.TITLES[section]}]({sections.anchor(section)})"
 
 
-def _point(statement: Statement, what: str, section: int, found: Reproduction) -> list[str]:
-    ours = statement.ours(found.shipped.cases)
+def _point(statement: Statement, what: str, found: Reproduction) -> list[str]:
+    ours, section = statement.ours(found.shipped.cases), statement.section - 1
     explained = standing(statement, found, sections.others_of(section, found))
     off = off_text(statement, ours)
     return [what, statement.published, f"{signed(ours)} %", off, explained, _link(section)]
@@ -112,8 +120,8 @@ def _ranking(comparison: Comparison) -> str:
     heads = ["strategy", "change of", *HYBRIDS, "from least to most"]
     return (
         "## Ranking\n\n" + markdown(heads, "ll" + "r" * len(HYBRIDS) + "l", rows)
-        + "\n\nThe fuel of `dp` is certified: no rule, however calibrated, burns less by more than "
-        f"{gap:.3f} % on the same tables."
+        + "\n\nThe fuel of `dp` is certified: no rule, however calibrated, that ends with the charge of "
+        f"`dp` or more burns less by more than {gap:.3f} % on the same tables."
     )  # fmt: skip
 
 
@@ -136,7 +144,8 @@ def _wheel_work(found: Reproduction) -> str:
 
 def _joint(found: Reproduction) -> str:
     """Several assumptions at once, all statements under each set."""
-    unders = [found.shipped] + [found.others[variation.name] for variation in JOINT[1:]]
+    names = [v.K_PHASES.name, K_AND_STEEP.name, *(variation.name for variation in JOINT_ELECTRIC)]
+    unders = [found.shipped, *(found.others[name] for name in names)]
     rows = [
         [s.what, s.published, *(signed(s.ours(u.cases)) + star(u, s) for u in unders)]
         for s in STATEMENTS
@@ -151,42 +160,53 @@ def _joint(found: Reproduction) -> str:
     rows.append(
         ["reached only after correction", "", *(f"{every - sure}" for sure, every in counts)]
     )
-    left = [f"{s.what} ({signed(o)} points)" for s, o in zip(STATEMENTS, off[-1], strict=True) if o]
     heads = ["point, %", "published", *(under.name for under in unders)]
     text = (
-        "A cause that explains one point must not spoil another. Each column keeps what the one "
-        "before it changed."
+        "A cause that explains one point must not spoil another. The study's text leaves open when the "
+        "engine rests, the NOx map, and up to which speed it drives electrically: the first two together, and "
+        "with them every speed of section 2, so that none is picked for what it gives."
     )
     return (
         f"## 7. Together\n\n{text}\n\n" + markdown(heads, "ll" + "r" * len(unders), rows)
         + "\n\n" + starred(unders, STATEMENTS)
-        + f"\n\nNot explained by the last column: {'; '.join(left) or 'nothing'}. Nothing of it is "
-        "taken over: files and rules stay as they are."
+        + f"\n\nReached in no column, not even after correction: {_reached_in_none(off)}. Nothing of it "
+        "is taken over: files and rules stay as they are."
     )  # fmt: skip
+
+
+def _reached_in_none(off: Sequence[Sequence[float]]) -> str:
+    """The statements that no column reaches, with the points that the nearest leaves; off: column -> points."""
+    left = []
+    for n, statement in enumerate(STATEMENTS):
+        nearest = min((column[n] for column in off), key=abs)
+        if nearest:
+            left.append(f"{statement.what} (at best {signed(nearest)} points)")
+    return "; ".join(left) or "nothing"
 
 
 def _own_rules(found: Reproduction) -> str:
     """What the differences show about our own rules."""
-    rows = []
+    rows, better = [], []
     for car in HYBRIDS:
         members = members_of(car, found)
         best = min(members, key=lambda m: m.fuel_percent)
         neutral = min(m.fuel_percent for m in members if m.neutral)
-        rows.append([car, f"{sum(not m.neutral for m in members)} of {len(members)}", signed(neutral),
+        penalty = least_penalty(found.families[car], 0)
+        better += [car] if penalty is not None and round(penalty, 1) < 0 else []
+        rows.append([car, f"{sum(not m.neutral for m in members)} of {len(members)}",
+                     f"{sum(m.passed_over for m in members)}", signed(neutral),
                      signed(best.fuel_percent) + ("" if best.neutral else "*"),
-                     _or_dash(least_penalty(found.families[car], 0))])  # fmt: skip
-    heads = ["car", "members that are not neutral", "fuel of the best neutral one, %",
+                     "-" if penalty is None else signed(penalty)])  # fmt: skip
+    heads = ["car", "members that are not neutral", "passed over", "fuel of the best neutral one, %",
              "fuel of the best of all, %", "least fuel of `nox_cut` against `conventional`, %"]  # fmt: skip
     text = (
         "`conventional` shifts the engine's load upwards only. Where braking gives back more "
-        "than a low threshold uses, it cannot spend the rest: such members are not neutral, and "
-        "the calibration passes them over. The members are those of the table in section 2, the "
-        "calibrated one included; what the stars stand for is said there. `nox_cut` may assist; "
-        "where a member of its family burns less than `conventional`, as in the last column, "
-        "`conventional` is not the best rule of its kind."
+        "than a low threshold uses, it cannot spend the rest: such members are not neutral. The "
+        "calibration passes over all whose end charge is worth more than 1 % of the fuel, which may be "
+        "neutral ones too: a joule of charge is worth more than one of fuel. The members are those of "
+        "the table in section 2, the calibrated one included; what the stars stand for is said there. "
+        "`nox_cut` may assist. Cars with a member of its family that burns less than their "
+        "`conventional`, which is then not the best rule of its kind: "
+        f"{', '.join(better) or 'none'}."
     )
-    return f"## 8. What this shows of our own rules\n\n{text}\n\n" + markdown(heads, "lrrrr", rows)
-
-
-def _or_dash(value: float | None) -> str:
-    return "-" if value is None else signed(value)
+    return f"## 8. What this shows of our own rules\n\n{text}\n\n" + markdown(heads, "lrrrrr", rows)

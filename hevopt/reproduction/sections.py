@@ -17,8 +17,6 @@ TITLES = (
     "5. NOx cut",
     "6. Energy at the wheels",
 )
-# Section of each published statement.
-SECTION_OF = (0, 1, 1, 2, 3, 4, 4, 4, 4)
 _LOSSES_ALL = (
     v.DRIVELINE, v.MACHINE_LOSS, v.CHARGING_LOSS, v.RESISTANCE, v.HYBRID_MASS, v.AUXILIARIES, v.ROAD, LOSSES,
 )  # fmt: skip
@@ -68,7 +66,8 @@ def fuel_of_hybrids(found: Reproduction) -> str:
     text = (
         "The study drives electrically up to some power or speed and gives neither. Ours takes the "
         "power threshold of least fuel and no speed threshold. Ours brakes with the machine as far "
-        "as it reaches and leaves nothing to the axle that is not driven. The engine's inertia is "
+        "as machine and battery reach, whichever axle a driver's brakes would load; the friction "
+        "brakes take the rest. The engine's inertia is "
         "charged on its own shaft, in A and in the hybrids alike: it moves both and hardly their "
         "ratio."
     )
@@ -138,8 +137,7 @@ def _section(section: int, found: Reproduction, text: str) -> str:
 
 
 def _statements(section: int) -> list[Statement]:
-    own = [s for s, n in zip(STATEMENTS, SECTION_OF, strict=True) if n == section]
-    return [*own, MEAN_NOX_WITHOUT_C1] if section == SECTION_OF[4] else own
+    return [s for s in (*STATEMENTS, MEAN_NOX_WITHOUT_C1) if s.section - 1 == section]
 
 
 def _names(unders: Sequence[Under]) -> str:

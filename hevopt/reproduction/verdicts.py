@@ -4,15 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from hevopt.published import STATEMENTS, Statement
-from hevopt.reproduction.cases import Member, Reproduction, Under
+from hevopt.reproduction.cases import Reproduction, Under
+from hevopt.reproduction.members import Member
 
-# Statements that a milder cut may meet: (car, figure of the member), by their text.
-_OF_FAMILY = {
-    STATEMENTS[5].what: ("E", "fuel_percent"),
-    STATEMENTS[6].what: ("D", "fuel_percent"),
-    STATEMENTS[7].what: ("E", "nox_percent"),
-}
-_STRATEGIES = ("start_stop", "conventional", "nox_cut")
+# In place of NOx as driven.
+_NOT_CORRECTED = "not corrected"
 
 
 class _Value(NamedTuple):
@@ -47,14 +43,9 @@ def off_text(statement: Statement, ours: float) -> str:
     return f"{signed(off)} points" if off else "within rounding"
 
 
-def cases_in(statement: Statement) -> list[tuple[str, str]]:
-    """The cases that a statement speaks of, without A."""
-    return [(car, name) for car in statement.cars for name in _STRATEGIES if name in statement.what]
-
-
 def applies(under: Under, statement: Statement) -> bool:
     """Whether the variation changes anything in a car that the statement is worked out from."""
-    against_a = "over" not in statement.what
+    against_a = statement.over is None
     return not {*statement.cars, *(["A"] if against_a else [])} <= under.untouched
 
 
@@ -92,9 +83,10 @@ def standing(statement: Statement, found: Reproduction, others: Iterable[Under])
     by = _sorted(statement, found, others)
     if by.reached:
         return "reached by a variation"
-    if _milder(statement, found.families):
-        return "reached by a milder cut"
-    passed = "passed by a variation" if by.passed else ""
+    if _meeting([statement], found.families):
+        both = _meeting(_of_one_family(statement), found.families)
+        return "reached by a milder cut" + ("" if both else ", which misses the car's other point")
+    passed = "between ours and a variation's" if by.passed else ""
     if not passed and by.passed_only_corrected:
         passed = "passed only after correction"
     reached = "reached only after correction" if by.reached_only_corrected else ""
@@ -138,18 +130,62 @@ def _shown(value: _Value) -> str:
 
 def _milder(statement: Statement, families: Mapping[str, Sequence[Member]]) -> str:
     """Which neutral members of nox_cut, as shipped but for how far it cuts, meet the statement."""
-    if statement.what not in _OF_FAMILY:
-        return ""
-    car, figure = _OF_FAMILY[statement.what]
-    neutral = [m for m in families[car] if m.neutral]
-    meeting = [m for m in neutral if not points_off(statement, getattr(m, figure))]
+    meeting = _meeting([statement], families)
     if not meeting:
         return ""
     fuel, nox = ([getattr(m, name) for m in meeting] for name in ("fuel_percent", "nox_percent"))
     return (
-        f" Reached by milder cuts: {len(meeting)} of the family's {len(neutral)} neutral members, "
-        f"which change fuel by {_range(fuel)} % and NOx by {_range(nox)} %."
+        f" Reached by milder cuts: {len(meeting)} of the family's {len(_neutral(statement, families))} neutral "
+        f"members, which change fuel by {_range(fuel)} % and NOx by {_range(nox)} %."
+        f"{_at_once(statement, families)}"
     )
+
+
+def _at_once(statement: Statement, families: Mapping[str, Sequence[Member]]) -> str:
+    """How many members meet every point of the statement's car, and the nearest where none does."""
+    points = _of_one_family(statement)
+    if len(points) == 1:
+        return ""
+    meeting = _meeting(points, families)
+    text = (
+        f" Members that reach every point of {statement.cars[0]} at once: {len(meeting) or 'none'}"
+    )
+    if meeting:
+        return f"{text}."
+    near = min(_neutral(statement, families), key=lambda m: max(_beyond(s, m) for s in points))
+    changes = f"fuel by {signed(near.fuel_percent)} % and NOx by {signed(near.nox_percent)} %"
+    return f"{text}; the nearest changes {changes}."
+
+
+def _of_one_family(statement: Statement) -> list[Statement]:
+    """The statements that a milder cut on the same car may meet.
+
+    "No gain" is none of them: it says that no cut brings any, which a cut that does little cannot show.
+    """
+    return [s for s in STATEMENTS if s.cars == statement.cars and s.over and s.low != 0]
+
+
+def _meeting(
+    statements: Sequence[Statement], families: Mapping[str, Sequence[Member]]
+) -> list[Member]:
+    """The neutral members of nox_cut that meet all of some statements on one car; [] where it may meet none."""
+    if any(s not in _of_one_family(s) for s in statements):
+        return []
+    neutral = _neutral(statements[0], families)
+    return [m for m in neutral if all(not points_off(s, _change(s, m)) for s in statements)]
+
+
+def _neutral(statement: Statement, families: Mapping[str, Sequence[Member]]) -> list[Member]:
+    return [m for m in families[statement.cars[0]] if m.neutral]
+
+
+def _change(statement: Statement, member: Member) -> float:
+    return (member.fuel_percent, member.nox_percent)[statement.figure]
+
+
+def _beyond(statement: Statement, member: Member) -> float:
+    """Points beyond the rounding of what is published."""
+    return max(abs(points_off(statement, _change(statement, member))) - statement.rounding, 0.0)
 
 
 def _range(values: Sequence[float]) -> str:
@@ -159,7 +195,7 @@ def _range(values: Sequence[float]) -> str:
 
 def star(under: Under, statement: Statement) -> str:
     """A star where a case that the statement speaks of is not neutral."""
-    return "*" if any(case in under.surplus_percent for case in cases_in(statement)) else ""
+    return "*" if any(case in under.surplus_percent for case in statement.cases) else ""
 
 
 def starred(unders: Iterable[Under], statements: Iterable[Statement]) -> str:
@@ -169,11 +205,12 @@ def starred(unders: Iterable[Under], statements: Iterable[Statement]) -> str:
     for under, statement in pairs:
         sizes = "; ".join(
             f"{' '.join(case)} {signed(under.surplus_percent[case])}"
-            for case in cases_in(statement)
+            for case in statement.cases
             if case in under.surplus_percent
         )
-        values = (statement.ours(under.cases), driven(under, statement))
-        rows.append([under.name, statement.what, sizes, *(signed(value) for value in values)])
+        as_driven = _NOT_CORRECTED if statement.figure else signed(driven(under, statement))
+        above = signed(statement.ours(under.cases))
+        rows.append([under.name, statement.what, sizes, above, as_driven])
     if not rows:
         return ""
     heads = ["starred under", "point", "end charge off, % of the fuel's energy", "as above, %",

@@ -113,14 +113,17 @@ def neutral_outcome(rules: Rules, threshold_w: float, nox_cap_kgps: float = np.i
     return outcome(level, until)
 
 
-def is_neutral(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
-    """Whether the window is kept and the end charge is worth at most a share of the cost."""
+def is_eligible(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
+    """Whether the window is kept and the end charge is worth at most a share of the cost.
+
+    Stricter than what rows call neutral, energy of that share: a joule of charge is worth more than one of fuel.
+    """
     worth_kg = abs(outcome.surplus_j) * rules.price_kgpj
     return outcome.inside and worth_kg <= share * outcome.cost_kg
 
 
 def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan:
-    """The neutral member of least figure; the whole family is its calibration, for the curve."""
+    """The eligible member of least figure; the whole family is its calibration, for the curve."""
     calibration = [
         {
             **settings,
@@ -128,7 +131,8 @@ def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan
             "corrected_kg": outcome.cost_kg - rules.price_kgpj * outcome.surplus_j,
             "nox_kg": outcome.nox_kg,
             "surplus_j": outcome.surplus_j,
-            "neutral": is_neutral(rules, outcome),
+            "inside": outcome.inside,
+            "eligible": is_eligible(rules, outcome),
         }
         for settings, outcome in members
     ]
@@ -137,8 +141,8 @@ def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan
         raise InfeasibleError(
             "no member of the rule family keeps the SOC window; widen it or use dp or ecms"
         )
-    neutral = [n for n in inside if calibration[n]["neutral"]] or inside
-    chosen = min(neutral, key=lambda n: figure(calibration[n]))
+    eligible = [n for n in inside if calibration[n]["eligible"]] or inside
+    chosen = min(eligible, key=lambda n: figure(calibration[n]))
     return Plan(members[chosen][1].control, {"calibration": calibration, "chosen": chosen})
 
 
