@@ -63,7 +63,7 @@ def test_a_starred_value_reaches_only_where_it_does_as_driven_too():
     assert standing(b, found, [short]) == "reached only after correction"
     assert standing(b, found, [far]) == "passed only after correction"
     beyond = under_of_b("beyond", -9.0)
-    assert standing(b, found, [beyond]) == "between ours and a variation's"
+    assert standing(b, found, [beyond]) == "lies between ours and a variation's"
     assert standing(b, found, [short, both]) == "reached by a variation"
     table = starred([short, under_of_b("neutral", -6.2)], [b])
     assert cells(table.splitlines()[-1]) == ["short", b.what, "B start_stop +2.0", "-6.2", "-4.9"]

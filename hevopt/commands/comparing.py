@@ -126,16 +126,14 @@ class Files:
         """Write all of them; a line for each, and the fronts and sensitivities that failed."""
         from hevopt import outputs
 
-        lines = []
-        # The page goes last: fronts and sensitivities take longer than all rows.
+        lines, failures = self._write_page(job, comparison)
         if self.out is not None:
             outputs.write_rows(self.out, comparison, job.about)
             lines.append(f"rows written to {self.out}")
         if self.steps is not None:
             outputs.write_steps(self.steps, comparison, outputs.joined(self._driven), job.about)
             lines.append(f"steps written to {self.steps}")
-        of_page, failures = self._write_page(job, comparison)
-        return lines + of_page, failures
+        return lines, failures
 
     def _write_page(
         self, job: Job, comparison: "Comparison"

@@ -162,9 +162,9 @@ def _joint(found: Reproduction) -> str:
     )
     heads = ["point, %", "published", *(under.name for under in unders)]
     text = (
-        "A cause that explains one point must not spoil another. The study's text leaves open when the "
-        "engine rests, the NOx map, and up to which speed it drives electrically: the first two together, and "
-        "with them every speed of section 2, so that none is picked for what it gives."
+        "A cause that explains one point must not spoil another. The study has, without a figure in its text, "
+        "a time in which a gear is being engaged, a NOx map, and a speed up to which it drives electrically: "
+        "the first two together, and with both every speed of section 2, so that none is picked for what it gives."
     )
     return (
         f"## 7. Together\n\n{text}\n\n" + markdown(heads, "ll" + "r" * len(unders), rows)
@@ -203,7 +203,7 @@ def _own_rules(found: Reproduction) -> str:
         "`conventional` shifts the engine's load upwards only. Where braking gives back more "
         "than a low threshold uses, it cannot spend the rest: such members are not neutral. The "
         "calibration passes over all whose end charge is worth more than 1 % of the fuel, which may be "
-        "neutral ones too: a joule of charge is worth more than one of fuel. The members are those of "
+        "neutral ones too: a joule of charge saves more than one of fuel. The members are those of "
         "the table in section 2, the calibrated one included; what the stars stand for is said there. "
         "`nox_cut` may assist. Cars with a member of its family that burns less than their "
         "`conventional`, which is then not the best rule of its kind: "

@@ -66,7 +66,7 @@ def fuel_of_hybrids(found: Reproduction) -> str:
     text = (
         "The study drives electrically up to some power or speed and gives neither. Ours takes the "
         "power threshold of least fuel and no speed threshold. Ours brakes with the machine as far "
-        "as machine and battery reach, whichever axle a driver's brakes would load; the friction "
+        "as machine and battery reach, as if all braking could go through its axle; the friction "
         "brakes take the rest. The engine's inertia is "
         "charged on its own shaft, in A and in the hybrids alike: it moves both and hardly their "
         "ratio."

@@ -86,7 +86,7 @@ def standing(statement: Statement, found: Reproduction, others: Iterable[Under])
     if _meeting([statement], found.families):
         both = _meeting(_of_one_family(statement), found.families)
         return "reached by a milder cut" + ("" if both else ", which misses the car's other point")
-    passed = "between ours and a variation's" if by.passed else ""
+    passed = "lies between ours and a variation's" if by.passed else ""
     if not passed and by.passed_only_corrected:
         passed = "passed only after correction"
     reached = "reached only after correction" if by.reached_only_corrected else ""
