@@ -8,6 +8,7 @@ but a reason; all others keep theirs.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from math import log
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,8 @@ def sensitivities(
     names = list(strategies or _usual(car.functions))
     for name in names:
         strategy_named(name)
+    options = {"nox_weight": nox_weight, "allow_shortfall": allow_shortfall, "refine": refine}
+    case_of = partial(prepare, cycle=trace, **options)
     trials = _trials(car.contents)
     total = 1 + sum(1 for trial in trials for changes in trial.changes if changes)
     done = 0
@@ -147,14 +150,7 @@ def sensitivities(
         progress(f"{car.name}: {what}", done, total)
         done += 1
         try:
-            changed = load_architecture(architecture, {**(base or {}), **changes})
-            case = prepare(
-                changed,
-                trace,
-                nox_weight=nox_weight,
-                allow_shortfall=allow_shortfall,
-                refine=refine,
-            )
+            case = case_of(load_architecture(architecture, {**(base or {}), **changes}))
         except HevoptError as error:
             return dict.fromkeys(names, error)
         return {name: _row(case, name) for name in names}
