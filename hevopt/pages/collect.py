@@ -35,8 +35,8 @@ from hevopt.pages.results import (
 from hevopt.problem import Plan, Trajectory
 from hevopt.provenance import files_digests, versions
 from hevopt.published import published_beside
-from hevopt.rows import NEUTRAL_PERCENT
 from hevopt.rows import Row as StudyRow
+from hevopt.rows import is_neutral
 from hevopt.simulation import simulate
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison
@@ -45,7 +45,7 @@ from hevopt.units import litres_per_100km
 # Decimals of traces: finer than any of them is known.
 _DIGITS = {
     "soc": 7, "fuel_kg": 9, "nox_kg": 12, "battery_power_w": 1, "engine_torque_nm": 3, "engine_speed_radps": 3,
-    "machine_torque_nm": 3, "machine_speed_radps": 3, "brake_power_w": 1, "wheel_power_w": 1, "speed_mps": 5,
+    "machine_torque_nm": 3, "machine_speed_radps": 3, "wheel_power_w": 1, "speed_mps": 5,
     "missing_torque_nm": 3,
 }  # fmt: skip
 
@@ -139,12 +139,10 @@ def _car(case: Case) -> CarFigures:
     missing = np.zeros(len(table.time_s)) if missing is None else missing
     return CarFigures(
         name=car.name,
-        description=car.description,
         time_s=table.time_s.tolist(),
         step_s=table.step_s.tolist(),
         speed_mps=_rounded("speed_mps", signals.speed_mps),
         wheel_power_w=_rounded("wheel_power_w", signals.wheel_power_w),
-        gear=signals.gear.tolist(),
         missing_torque_nm=_rounded("missing_torque_nm", missing),
         soc_min=case.problem.battery.soc_min,
         soc_max=case.problem.battery.soc_max,
@@ -168,7 +166,7 @@ def _detail(case: Case, plan: Plan, trajectory: Trajectory) -> Detail:
     on_s, off_s = spells_s(on, step_s)
     price = plan.notes.get("price_kgpj")
     return Detail(
-        trace=_trace(case, trajectory, operation, on),
+        trace=_trace(case, trajectory, operation),
         energy=energy_of(trajectory, step_s, case.car.engine.heating_value_jpkg),
         shares=shares_of(trajectory, table, operation, nox_known=case.car.engine.nox_known),
         limits=limits_touched(case.car, case.problem, trajectory),
@@ -180,7 +178,7 @@ def _detail(case: Case, plan: Plan, trajectory: Trajectory) -> Detail:
     )
 
 
-def _trace(case: Case, trajectory: Trajectory, operation: NDArray, on: NDArray) -> Trace:
+def _trace(case: Case, trajectory: Trajectory, operation: NDArray) -> Trace:
     table, flows = case.problem.table, trajectory.flows
     labels = [table.controls[c] for c in trajectory.control]
     listed = table.signals.gear.tolist()
@@ -193,7 +191,6 @@ def _trace(case: Case, trajectory: Trajectory, operation: NDArray, on: NDArray) 
     }
     return Trace(
         operation=operation.tolist(),
-        engine_on=on.astype(int).tolist(),
         engine_gear=[label.engine_gear or gear for label, gear in zip(labels, listed, strict=True)],
         machine_gear=[label.machine_gear for label in labels],
         **{name: _rounded(name, value) for name, value in values.items()},
@@ -205,7 +202,7 @@ def _calibration(case: Case, notes: Mapping[str, Any]) -> list[Member]:
     if len(members) < 2:
         return []
     density, distance_m = case.car.engine.fuel_density_kgpm3, case.cycle.distance_m
-    weight, nox_known = case.problem.nox_weight, case.car.engine.nox_known
+    weight, engine = case.problem.nox_weight, case.car.engine
 
     def litres(mass_kg: float) -> float:
         return litres_per_100km(mass_kg, density, distance_m)
@@ -214,22 +211,18 @@ def _calibration(case: Case, notes: Mapping[str, Any]) -> list[Member]:
         Member(
             threshold_w=member["threshold_w"],
             nox_cap_kgps=member.get("nox_cap_kgps"),
-            fuel_l_per_100km=litres(member["cost_kg"] - weight * member["nox_kg"]),
             corrected_l_per_100km=litres(member["corrected_kg"]),
-            nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m if nox_known else None,
+            nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m if engine.nox_known else None,
             surplus_j=member["surplus_j"],
-            neutral=member["inside"] and _is_neutral(case, member),
+            neutral=bool(member["inside"])
+            and is_neutral(
+                member["surplus_j"],
+                engine.heating_value_jpkg * (member["cost_kg"] - weight * member["nox_kg"]),
+            ),
             chosen=n == notes["chosen"],
         )
         for n, member in enumerate(members)
     ]
-
-
-def _is_neutral(case: Case, member: Mapping[str, Any]) -> bool:
-    """As for rows; the calibration itself asks for less."""
-    fuel_kg = member["cost_kg"] - case.problem.nox_weight * member["nox_kg"]
-    fuel_j = fuel_kg * case.car.engine.heating_value_jpkg
-    return 100 * abs(member["surplus_j"]) <= NEUTRAL_PERCENT * fuel_j
 
 
 def _trouble(notes: Mapping[str, Any]) -> list[str]:

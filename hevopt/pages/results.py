@@ -58,12 +58,10 @@ class CarFigures(FileModel):
     """
 
     name: str
-    description: str
     time_s: list[float]
     step_s: list[float]
     speed_mps: list[float]
     wheel_power_w: list[float]
-    gear: list[int]
     missing_torque_nm: list[float]
     soc_min: float
     soc_max: float
@@ -79,7 +77,6 @@ class Trace(FileModel):
 
     soc: list[float]
     operation: list[int]
-    engine_on: list[int]
     engine_gear: list[int]
     machine_gear: list[int]
     fuel_kg: list[float]
@@ -89,7 +86,6 @@ class Trace(FileModel):
     engine_speed_radps: list[float]
     machine_torque_nm: list[float]
     machine_speed_radps: list[float]
-    brake_power_w: list[float]
 
 
 class Link(FileModel):
@@ -131,11 +127,13 @@ class Share(FileModel):
 
 
 class Member(FileModel):
-    """One member of a rule family: thresholds, and what comes of them; NOx None where it is not known."""
+    """One member of a rule family: thresholds, and what comes of them; NOx None where it is not known.
+
+    neutral: keeps the SOC window, and its end charge is that asked within 1 % of the fuel's energy, as of rows
+    """
 
     threshold_w: float
     nox_cap_kgps: float | None = None
-    fuel_l_per_100km: float
     corrected_l_per_100km: float
     nox_mg_per_km: float | None
     surplus_j: float

@@ -59,3 +59,18 @@ def test_limits_count_the_steps_at_the_machine_s_limit(nedc):
         np.abs(torque * speed) > 0.99 * machine.power_max_w
     )
     assert detail.limits["machine torque or power"] == near.sum() > 0
+
+
+def test_neutral_means_the_same_of_members_and_rows(nedc):
+    found = set()
+    for row in nedc.results.rows:
+        case, plan, _ = nedc.solved[row.figures.architecture, row.figures.strategy]
+        for member, note in zip(
+            row.detail.calibration, plan.notes.get("calibration", []), strict=False
+        ):
+            fuel_j = case.car.engine.heating_value_jpkg * note["cost_kg"]
+            within = 100 * abs(member.surplus_j) <= fuel_j
+            assert member.neutral == (within and note["inside"])
+            found.add((member.neutral, note["eligible"]))
+    # By the worth of its charge in fuel, the stricter measure, a member may still be off.
+    assert found >= {(True, True), (True, False), (False, False)}
