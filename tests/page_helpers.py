@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from time import monotonic
 
 import pytest
 
@@ -16,6 +17,11 @@ FLAGS = [
     "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
     "--disable-sync", "--no-first-run", "--disable-dev-shm-usage",
 ]  # fmt: skip
+
+AXES = """() => [...document.querySelectorAll('.plot')].flatMap(plot => Object.entries(plot._fullLayout)
+  .filter(([name]) => /^[xy]axis[0-9]*$/.test(name) && plot._fullLayout._plots)
+  .filter(() => (plot._fullData || []).some(trace => trace.type !== 'sankey'))
+  .map(([name, axis]) => [plot.id, name, axis.title.text || '']))"""
 
 
 def find_browser() -> str:
@@ -65,6 +71,14 @@ class Opened:
             self.page.wait_for_selector("html[data-drawn]", state="attached")
 
 
+def until(page, condition: str, seconds: float = 20.0) -> None:
+    """Wait for a condition of the page; the page's own policy forbids the browser to wait for a text."""
+    end = monotonic() + seconds
+    while not page.evaluate(condition):
+        assert monotonic() < end, f"not within {seconds} s: {condition}"
+        page.wait_for_timeout(20)
+
+
 def forty_rows() -> Results:
     """Forty rows of 1800 steps: dynamic programming on WLTC, every car under several names."""
     collector = Collector()
@@ -79,3 +93,36 @@ def forty_rows() -> Results:
         figures = row["figures"] | {"architecture": f"{own} {n}"}
         contents["rows"].append({"figures": figures, "detail": row["detail"]})
     return Results.model_validate(contents)
+
+
+def settle(page):
+    """Wait until what the page does on a change of media is done."""
+    page.evaluate("new Promise(done => requestAnimationFrame(() => setTimeout(done, 50)))")
+
+
+def front(car):
+    points = [
+        {
+            "nox_weight": weight, "nox_weights": [weight], "strategy": "dp", "fuel_l_per_100km": fuel,
+            "nox_mg_per_km": nox, "bound_l_per_100km": fuel, "gap_percent": 0.1, "certificate": "LP prices",
+        }
+        for weight, fuel, nox in ((0.0, 2.8, 300.0), (10.0, 2.9, 200.0))
+    ]  # fmt: skip
+    corners = ((260.0, 2.8), (190.0, 2.88))
+    outer = [{"nox_mg_per_km": nox, "fuel_l_per_100km": fuel} for nox, fuel in corners]
+    return {
+        "architecture": car,
+        "cycle": "nedc",
+        "points": points,
+        "outer": outer,
+        "gap_percent": 0.1,
+    }
+
+
+def effect(car, percent):
+    return {
+        "architecture": car, "strategy": "dp", "parameter": car, "unit": car, "values": [1.0, 2.0, 3.0],
+        "fuel_l_per_100km": [2.7, 2.8, 2.9], "delta_percent": [-percent, 0.0, percent],
+        "nox_mg_per_km": [1.0, 1.0, 1.0], "delta_nox_percent": [0.0, 0.0, None], "elasticity": 0.3,
+        "elasticity_nox": None,
+    }  # fmt: skip

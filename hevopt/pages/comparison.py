@@ -65,19 +65,17 @@ def _figures(row: Row) -> dict[str, Any]:
         derived["co2_corrected_g_per_km"] = figures.co2_g_per_km * share
     if figures.soc_end is not None:
         derived["delta_soc"] = figures.soc_end - figures.soc_start
-    proof, _, scope = (figures.certificate or "").partition(", ")
-    return (
-        figures.model_dump()
-        | derived
-        | {"proof": proof, "scope": scope, "solved": row.detail is not None}
-    )
+    proof = (figures.certificate or "").split(",")[0]
+    return figures.model_dump() | derived | {"proof": proof, "solved": row.detail is not None}
 
 
 def _effects(results: Results) -> dict[str, list[Sensitivity]]:
-    """Architecture and strategy -> its sensitivities."""
+    """Architecture and strategy -> its sensitivities, the largest on fuel first."""
     effects: dict[str, list[Sensitivity]] = {}
     for line in results.sensitivity or []:
         effects.setdefault(f"{line.architecture} {line.strategy}", []).append(line)
+    for lines in effects.values():
+        lines.sort(key=lambda line: -max(map(abs, line.delta_percent)))
     return effects
 
 

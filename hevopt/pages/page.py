@@ -7,10 +7,12 @@ a policy in the page's head allows no address whatever, and no script but those 
 import base64
 import gzip
 import hashlib
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -46,6 +48,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["fixed"] = fixed
+    environment.filters["weights"] = weights
     return environment
 
 
@@ -57,6 +60,15 @@ def fixed(value: float | None, form: str = ".3f") -> str:
     if not any(digit in text for digit in "123456789"):
         text = text.replace("-", "+" if "+" in form else "")
     return text.replace("-", "−")
+
+
+def weights(values: Sequence[float]) -> str:
+    """The least and the largest of some weights with three digits, without powers of ten."""
+    shown = [
+        np.format_float_positional(float(f"{value:.3g}"), trim="-")
+        for value in (min(values), max(values))
+    ]
+    return " to ".join(dict.fromkeys(shown))
 
 
 @cache

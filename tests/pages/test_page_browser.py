@@ -5,7 +5,7 @@ import json
 import re
 
 import pytest
-from page_helpers import find_browser, forty_rows
+from page_helpers import AXES, effect, find_browser, forty_rows, front, until
 
 from hevopt.pages.comparison import comparison_page
 from hevopt.pages.page import fixed
@@ -22,15 +22,6 @@ CELLS = """() => [...document.querySelectorAll('#comparison tbody tr')]
 FIRST = (
     "[...document.querySelectorAll('#comparison tbody tr')].map(row => row.cells[{}].dataset.value)"
 )
-AXES = """() => [...document.querySelectorAll('.plot')].flatMap(plot => Object.entries(plot._fullLayout)
-  .filter(([name]) => /^[xy]axis[0-9]*$/.test(name) && plot._fullLayout._plots)
-  .filter(() => (plot._fullData || []).some(trace => trace.type !== 'sankey'))
-  .map(([name, axis]) => [plot.id, name, axis.title.text || '']))"""
-
-
-def settle(page):
-    """Wait until what the page does on a change of media is done."""
-    page.evaluate("new Promise(done => requestAnimationFrame(() => setTimeout(done, 50)))")
 
 
 def test_opening_and_using_it_logs_nothing_and_asks_for_nothing(nedc, opened):
@@ -42,10 +33,9 @@ def test_opening_and_using_it_logs_nothing_and_asks_for_nothing(nedc, opened):
     page.click("#comparison thead button >> nth=2")
     for width in (400, 1000):
         page.set_viewport_size({"width": width, "height": 800})
-        page.wait_for_timeout(300)
+        drawn = "document.getElementById('traces')._fullLayout.width"
+        until(page, f"{width} - 70 < {drawn} && {drawn} < {width}")
         assert page.evaluate("document.documentElement.scrollWidth") == width  # never sideways
-        drawn = page.evaluate("document.getElementById('traces')._fullLayout.width")
-        assert width - 70 < drawn < width
     assert found.trouble == []
     assert {url.split(":")[0] for url in found.requests} == {"file"} and len(found.requests) == 1
 
@@ -173,50 +163,6 @@ def test_the_downloads_are_the_saved_results_and_the_json_values(nedc, shown):
     ]
 
 
-def test_no_bar_crosses_the_bound_drawn_at_it(shown):
-    bars = shown.page.evaluate(
-        "document.getElementById('fuel-bars').data.map(t => [t.type, [...t.x], [...t.y]])"
-    )
-    bound = next((x, y) for kind, x, y in bars if kind == "scatter")
-    levels = {
-        round((a + b) / 2, 6): y
-        for a, b, y in zip(bound[0][::3], bound[0][1::3], bound[1][::3], strict=True)
-    }
-    drawn = [(x, y) for kind, xs, ys in bars if kind == "bar" for x, y in zip(xs, ys, strict=True)]
-    assert len(drawn) == len(levels) == 20
-    assert all(y >= levels[round(x, 6)] - 1e-9 for x, y in drawn)
-
-
-def test_every_axis_names_its_quantity_and_unit(shown):
-    axes = shown.page.evaluate(AXES)
-    assert len(axes) >= 20
-    bare = {"mode", "architecture"}
-    for figure, name, title in axes:
-        if (figure, name) == ("shares", "yaxis"):  # the rows' names
-            continue
-        assert title in bare or re.search(r"\(.+\)$", title), (figure, name, title)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_page_and_figures_follow_the_colour_scheme_as_it_changes(shown, scheme):
-    page = shown.page
-    page.emulate_media(color_scheme={"light": "dark", "dark": "light"}[scheme])
-    papers = (
-        "[getComputedStyle(document.body).backgroundColor, "
-        "document.getElementById('traces')._fullLayout.paper_bgcolor]"
-    )
-    settle(page)
-    first = page.evaluate(papers)
-    page.emulate_media(color_scheme=scheme)
-    settle(page)
-    then = page.evaluate(papers)
-    page.emulate_media(color_scheme="light")
-    assert all(a != b for a, b in zip(first, then, strict=True))
-    assert then == (
-        ["rgb(255, 255, 255)", "#ffffff"] if scheme == "light" else ["rgb(20, 24, 28)", "#14181c"]
-    )
-
-
 def test_without_scripts_verdict_and_tables_are_there_and_figures_say_what_is_missing(nedc, opened):
     settings = {"java_script_enabled": False, "viewport": {"width": 400, "height": 800}}
     page = opened(nedc.path, wait=False, **settings).page
@@ -235,51 +181,6 @@ def test_an_old_browser_is_told_that_figures_are_missing(nedc, opened):
     assert "current one can" in found.page.locator(".missing").first.inner_text()
     assert found.page.locator("#comparison tbody tr").count() == 20
     assert found.trouble == []
-
-
-def test_on_paper_every_figure_is_drawn_light_and_within_the_page(shown):
-    page = shown.page
-    page.emulate_media(media="print", color_scheme="dark")
-    settle(page)
-    looks = page.evaluate(
-        "[...document.querySelectorAll('.plot')].map(p => [p._fullLayout.width, p._fullLayout.paper_bgcolor])"
-    )
-    assert len(looks) >= 11
-    assert all(width <= 690 and paper in ("#fff", "#ffffff") for width, paper in looks)
-    page.emulate_media(media="screen", color_scheme="light")
-    settle(page)
-    assert page.evaluate("document.getElementById('traces')._fullLayout.width") > 690
-    page.evaluate("Plotly.relayout('traces', {'xaxis.range[0]': 100, 'xaxis.range[1]': 200})")
-    assert page.input_value("#from") == "100"  # zooming is still linked afterwards
-    page.click("#whole")
-
-
-def front(car):
-    points = [
-        {
-            "nox_weight": weight, "nox_weights": [weight], "strategy": "dp", "fuel_l_per_100km": fuel,
-            "nox_mg_per_km": nox, "bound_l_per_100km": fuel, "gap_percent": 0.1, "certificate": "LP prices",
-        }
-        for weight, fuel, nox in ((0.0, 2.8, 300.0), (10.0, 2.9, 200.0))
-    ]  # fmt: skip
-    corners = ((260.0, 2.8), (190.0, 2.88))
-    outer = [{"nox_mg_per_km": nox, "fuel_l_per_100km": fuel} for nox, fuel in corners]
-    return {
-        "architecture": car,
-        "cycle": "nedc",
-        "points": points,
-        "outer": outer,
-        "gap_percent": 0.1,
-    }
-
-
-def effect(car, percent):
-    return {
-        "architecture": car, "strategy": "dp", "parameter": car, "unit": car, "values": [1.0, 2.0, 3.0],
-        "fuel_l_per_100km": [2.7, 2.8, 2.9], "delta_percent": [-percent, 0.0, percent],
-        "nox_mg_per_km": [1.0, 1.0, 1.0], "delta_nox_percent": [0.0, 0.0, None], "elasticity": 0.3,
-        "elasticity_nox": None,
-    }  # fmt: skip
 
 
 def test_names_from_files_stay_text(nedc, opened, tmp_path):
@@ -328,31 +229,15 @@ def test_what_was_not_asked_for_is_said_and_a_wide_figure_says_to_scroll(nedc, o
     assert page.locator("#figure-fuel-bars.wider").count() == 0
 
 
-def test_bounds_of_fronts_have_the_colour_of_their_car(nedc, opened, tmp_path):
-    fronts = {"pareto": [front("C2"), front("D")]}
-    contents = json.loads(nedc.results.model_dump_json()) | fronts
-    path = tmp_path / "fronts.html"
-    path.write_text(comparison_page(type(nedc.results).model_validate(contents)), encoding="utf-8")
-    page = opened(path).page
-    found = page.evaluate("document.getElementById('pareto-front').data.map(t => t.line.color)")
-    assert found[0] == found[1] != found[2] == found[3]
-    assert "--fronts" not in page.locator("#left-out").inner_text()
-
-
-def test_forty_rows_of_1800_steps_stay_small_and_quick(opened, tmp_path):
+def test_forty_rows_of_1800_steps_stay_small_and_usable(opened, tmp_path):
     results = forty_rows()
     assert len(results.rows) == 40 and len(next(iter(results.cars.values())).time_s) >= 1800
     page_file = tmp_path / "forty.html"
     page_file.write_text(comparison_page(results), encoding="utf-8")
     assert page_file.stat().st_size <= 12e6
     page = opened(page_file).page
-    paint = page.evaluate("performance.getEntriesByName('first-contentful-paint')[0].startTime")
-    assert paint < 2000
-    seconds = page.evaluate(
-        "() => { const t = performance.now(); const s = document.getElementById('row');"
-        "s.value = '39'; s.dispatchEvent(new Event('change')); return (performance.now() - t) / 1e3; }"
-    )
-    assert seconds < 2
+    page.select_option("#row", "39")
+    assert page.locator("#h-row .chosen-name").inner_text() == "C2 39 dp"
     assert page.locator("#comparison tbody tr").count() == 40
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from page_helpers import Opened
+from page_helpers import Opened, until
 from typer.testing import CliRunner
 
 from hevopt.cli import app
@@ -510,8 +510,8 @@ def test_using_the_page_logs_nothing_asks_for_nothing_and_does_what_it_says(view
 
     page.emulate_media(color_scheme="dark")
     page.set_viewport_size({"width": 400, "height": 800})
-    page.wait_for_timeout(300)
-    assert page.evaluate("document.documentElement.scrollWidth") == 400
+    until(page, "document.getElementById('parallel')._fullLayout.paper_bgcolor === '#14181c'")
+    until(page, "document.documentElement.scrollWidth === 400")
     assert viewed.trouble == []
     assert {url.split(":")[0] for url in viewed.requests} <= {"file", "blob"}
 

@@ -166,6 +166,21 @@ const OneRow = (onZoom) => {
   const HUES = { Fuel: 1, Engine: 2, Motor: 5, Generator: 5, "Battery, drawn": 3, "Battery, stored": 3 };
   const KEPT = ["Road load", "Battery, stored"];
 
+  // The library lets a label to the right of its place run into one to the left of the next: the lower moves down.
+  function apart(element) {
+    const placed = [];
+    const labels = [...element.querySelectorAll(".node-label")].map((label) => ({ label, box: label.getBoundingClientRect() }));
+    for (const { label, box } of labels.sort((a, b) => a.box.top - b.box.top)) {
+      let top = box.top;
+      for (const other of placed) {
+        if (box.left < other.right && other.left < box.right && top < other.bottom && other.top < top + box.height) top = other.bottom;
+      }
+      placed.push({ left: box.left, right: box.right, top, bottom: top + box.height });
+      placed.sort((a, b) => a.top - b.top);
+      if (top > box.top) label.style.translate = `0 ${(top - box.top) / label.getScreenCTM().a}px`;
+    }
+  }
+
   function sankey(look, width) {
     const { links, residual_j } = Shown.results.rows[Shown.chosen].detail.energy;
     const places = [...new Set(links.flatMap((link) => [link.source, link.target]))];
@@ -173,9 +188,9 @@ const OneRow = (onZoom) => {
     const size = (place) => Math.max(through(place, "source"), through(place, "target")) / 1e3;
     const ends = (place) => !links.some((link) => link.source === place);
     const hue = (place) => look.colours[HUES[place] ?? (ends(place) && !KEPT.includes(place) ? 0 : 4)];
-    const label = (place) => `${place.replace(", ", ",<br>")}<br>${fixed(size(place), size(place) < 10 ? 1 : 0)} kJ`;
+    const label = (place) => `${place} ${fixed(size(place), size(place) < 10 ? 1 : 0)} kJ`;
     return {
-      least: 760,
+      least: 960, fresh: true, after: apart,
       data: [{
         type: "sankey", arrangement: "snap", valueformat: ",.1f", valuesuffix: " kJ", textfont: { size: 11, color: look.ink, shadow: "none" },
         node: { label: places.map(label), color: places.map(hue), customdata: places, pad: 26, thickness: 14, line: { color: look.ink, width: 0.5 }, hovertemplate: "%{customdata}: %{value}<extra></extra>" },

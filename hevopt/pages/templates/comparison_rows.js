@@ -5,6 +5,7 @@
 const Shown = { results: null, names: [], chosen: -1, view: null };
 
 const Look = (() => {
+  const short = (name) => (name.length > 14 ? `${name.slice(0, 13)}…` : name);
   const FAMILIES = ["baseline", "start_stop", "conventional", "nox_cut", "ecms", "dp", "convex", "mpc", "a_ecms", "sdp"];
   return {
     HATCHES: ["", "/", "\\", "x", ".", "-", "|", "+", "", "/"],
@@ -13,6 +14,9 @@ const Look = (() => {
     // A strategy looks the same in every comparison.
     styleOf: (strategy) => (FAMILIES.includes(strategy) ? FAMILIES.indexOf(strategy) : FAMILIES.length - 1),
     nameOf: (row) => `${row.figures.architecture} ${row.figures.strategy}`,
+    // Names as an axis or a legend has room for them; in full in tables and where the mouse rests.
+    short,
+    shortNameOf: (row) => `${short(row.figures.architecture)} ${row.figures.strategy}`,
     narrow: (width) => width < 560,
     fixed: (value, digits) => value.toFixed(digits).replace("-", "−"),
   };
@@ -20,7 +24,7 @@ const Look = (() => {
 
 const AllRows = (() => {
   const { byId, plain, axis, layout, figure } = Page;
-  const { HATCHES, DASHES, SYMBOLS, styleOf, nameOf, narrow, fixed } = Look;
+  const { HATCHES, DASHES, SYMBOLS, styleOf, nameOf, short, shortNameOf, narrow, fixed } = Look;
   const MODE_COLOURS = [0, 9, 3, 6, 4, 2, 1, 5];
 
   // Bars ----------------------------------------------------------------------------------------------------------
@@ -46,7 +50,7 @@ const AllRows = (() => {
     }
     return {
       tickvals: [...groups.values()].map((xs) => (xs[0] + xs[xs.length - 1]) / 2),
-      ticktext: [...groups.keys()].map((name) => plain(name.length > 14 ? `${name.slice(0, 13)}…` : name)),
+      ticktext: [...groups.keys()].map((name) => plain(short(name))),
     };
   }
 
@@ -119,7 +123,7 @@ const AllRows = (() => {
     }).filter((trace) => trace.x.some((share) => share > 0));
     const rows = narrow(width) ? 5 : 2;
     return { height: 24 * solved.length + 80 + 22 * rows, data, layout: layout(look, width, { barmode: "stack", bargap: 0.25,
-      xaxis: axis(look, "share of time (%)", { range: [0, 100], fixedrange: true }), yaxis: axis(look, "", { autorange: "reversed", ticks: "", fixedrange: true, showgrid: false, tickfont: { size: 11 } }),
+      xaxis: axis(look, "share of time (%)", { range: [0, 100], fixedrange: true }), yaxis: axis(look, "", { autorange: "reversed", tickvals: labels, ticktext: solved.map((row) => plain(shortNameOf(row))), ticks: "", fixedrange: true, showgrid: false, tickfont: { size: 11 } }),
       margin: { l: 60, r: 14, t: 10, b: 44 }, legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", traceorder: "normal", font: { size: 11 } } }) };
   }
 
@@ -137,7 +141,7 @@ const AllRows = (() => {
     const data = [], x = (m) => m.threshold_w / 1e3, y = (m) => m.corrected_l_per_100km;
     for (const row of calibrated(false)) {
       const n = carNames().indexOf(row.figures.architecture), line = lineOf(look, n), members = row.detail.calibration;
-      data.push({ type: "scatter", mode: "lines+markers", name: plain(nameOf(row)), x: members.map(x), y: members.map(y), line,
+      data.push({ type: "scatter", mode: "lines+markers", name: plain(shortNameOf(row)), x: members.map(x), y: members.map(y), line,
         marker: { symbol: members.map((m) => SYMBOLS[n % SYMBOLS.length] + (m.neutral ? "" : "-open")), size: 6, color: line.color },
         customdata: members.map((m) => [m.nox_mg_per_km === null ? "unknown" : `${fixed(m.nox_mg_per_km, 0)} mg/km`, m.surplus_j / 1e3]), hovertemplate: `${plain(nameOf(row))}<br>%{x:.2f} kW: %{y:.3f} l/100 km<br>NO<sub>x</sub> %{customdata[0]}, end surplus %{customdata[1]:+.1f} kJ<extra></extra>` });
       data.push(ring(look, members.filter((m) => m.chosen), x, y));
@@ -151,7 +155,7 @@ const AllRows = (() => {
       const n = carNames().indexOf(row.figures.architecture), line = lineOf(look, n, { width: 1.2 }), members = row.detail.calibration;
       [...new Set(members.map((m) => m.threshold_w))].forEach((threshold) => {
         const own = members.filter((m) => m.threshold_w === threshold), taken = own.some((m) => m.chosen);
-        data.push({ type: "scatter", mode: "lines+markers", name: plain(nameOf(row)), legendgroup: `family ${n}`, showlegend: taken, opacity: taken ? 1 : 0.4, x: own.map(x), y: own.map(y), line,
+        data.push({ type: "scatter", mode: "lines+markers", name: plain(shortNameOf(row)), legendgroup: `family ${n}`, showlegend: taken, opacity: taken ? 1 : 0.4, x: own.map(x), y: own.map(y), line,
           marker: { symbol: own.map((m) => SYMBOLS[n % SYMBOLS.length] + (m.neutral ? "" : "-open")), size: 6, color: line.color },
           customdata: own.map((m) => [m.threshold_w / 1e3, m.nox_cap_kgps * 1e6]), hovertemplate: `${plain(nameOf(row))}<br>%{x:.3f} l/100 km, %{y:.0f} mg/km<br>electric below %{customdata[0]:.2f} kW, cap %{customdata[1]:.2f} mg/s<extra></extra>` });
       });
@@ -168,15 +172,17 @@ const AllRows = (() => {
   }
 
   function pareto(look, width) {
-    const data = [];
+    const data = [], bounds = [];
     Shown.results.pareto.forEach((front, n) => {
-      const line = lineOf(look, n), outer = outerFront(front), name = plain(front.architecture);
-      data.push({ type: "scatter", mode: "lines+markers", name, legendgroup: name, x: front.points.map((p) => p.fuel_l_per_100km), y: front.points.map((p) => p.nox_mg_per_km),
+      const line = lineOf(look, n), outer = outerFront(front), name = plain(front.architecture), label = plain(short(front.architecture));
+      data.push({ type: "scatter", mode: "lines+markers", name: label, legendgroup: name, x: front.points.map((p) => p.fuel_l_per_100km), y: front.points.map((p) => p.nox_mg_per_km),
         line, marker: { symbol: SYMBOLS[n % SYMBOLS.length], size: 8 }, customdata: front.points.map((p) => p.nox_weight),
-        hovertemplate: `${name}, weight %{customdata:.3g}<br>%{x:.3f} l/100 km, %{y:.1f} mg/km<extra></extra>` });
-      data.push({ type: "scatter", mode: "lines", name: `${name}, bound`, legendgroup: name, x: outer.map((c) => c.fuel_l_per_100km), y: outer.map((c) => c.nox_mg_per_km),
-        line: { ...line, width: 0.9 }, hoverinfo: "skip" });
+        hovertemplate: `${name}, weight %{customdata:.3~r}<br>%{x:.3f} l/100 km, %{y:.1f} mg/km<extra></extra>` });
+      // Where the proof is tight it lies on the points' own line, and is seen only in ink, and last.
+      bounds.push({ type: "scatter", mode: "lines", name: "proven outer front", legendgroup: name, showlegend: n === 0, x: outer.map((c) => c.fuel_l_per_100km), y: outer.map((c) => c.nox_mg_per_km),
+        line: { color: look.ink, width: 1, dash: "solid" }, hoverinfo: "skip" });
     });
+    data.push(...bounds);
     return { data, layout: layout(look, width, { xaxis: axis(look, "fuel (l/100 km)"), yaxis: axis(look, "NO<sub>x</sub> (mg/km)"), hovermode: "closest" }) };
   }
 
@@ -184,7 +190,7 @@ const AllRows = (() => {
     const small = narrow(width), chosenName = byId("effects-of").value;
     const lines = Shown.results.sensitivity.filter((line) => `${line.architecture} ${line.strategy}` === chosenName);
     const effect = (line) => Math.max(...line.delta_percent.map(Math.abs));
-    lines.sort((a, b) => effect(a) - effect(b));
+    lines.sort((a, b) => effect(b) - effect(a)).reverse();
     const span = (line) => [line.values[0], line.values[line.values.length - 1]].map((v) => String(Number(v.toPrecision(4)))).join(" to ");
     const labels = lines.map((line) => plain(small ? line.parameter : `${line.parameter}, ${span(line)} ${line.unit}`));
     const bar = (name, key, end, panel, n, shape) => ({ type: "bar", orientation: "h", name, y: labels, x: lines.map((line) => (end ? line[key][line[key].length - 1] : line[key][0])), xaxis: `x${panel}`, yaxis: `y${panel}`,

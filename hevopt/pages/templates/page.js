@@ -57,21 +57,25 @@ const Page = (() => {
     };
   }
 
-  // build(look, width) -> { data, layout, height?, least?, on? }
-  // least: width below which the figure scrolls in its box; on: event of the library -> what to do
+  // build(look, width) -> { data, layout, height?, least?, on?, fresh?, after? }
+  // least: width below which the figure scrolls in its box, and on paper is scaled down; on: event of the library ->
+  // what to do; fresh: drawn anew each time, for a figure that would glide into place and be printed on its way; after: what to do with the drawn
   function draw(id) {
     const element = byId(id), build = figures.get(id);
     if (!element || !build || !library) return;
     // A4 within its margins, in CSS pixels.
     const inMaps = element.closest(".maps") !== null;
     const room = onPaper ? (inMaps ? 340 : 690) : element.clientWidth;
-    const made = build(theme(), room), width = onPaper ? room : Math.max(room, made.least ?? 0);
+    const made = build(theme(), room), width = Math.max(room, made.least ?? 0);
     const most = onPaper ? (inMaps ? 310 : 880) : Infinity, height = Math.min(most, made.height || Number(element.dataset.height));
     const config = { displaylogo: false, displayModeBar: "hover", staticPlot: onPaper, showTips: false, showSendToCloud: false, plotlyServerURL: "",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-    element.closest("figure").classList.toggle("wider", width > room);
+    element.closest("figure").classList.toggle("wider", width > room && !onPaper);
+    element.style.zoom = onPaper ? room / width : "";
+    if (made.fresh) Plotly.purge(element);
     element.querySelector(".missing")?.remove();
     Plotly.react(element, made.data, { ...made.layout, width, height }, config);
+    made.after?.(element);
     // On paper and back the library begins anew, without what listened to it.
     for (const [name, act] of Object.entries(made.on ?? {})) {
       element.removeAllListeners(name);
