@@ -9,11 +9,18 @@ from pydantic import ValidationError
 
 from hevopt.errors import DataError
 from hevopt.files import printable
-from hevopt.pages.results import FORMAT, Results
+from hevopt.pages.results import FORMAT, CarFigures, Results, Row
 
 _MEGABYTES_MAX = 500
 _MAGIC = b"\x1f\x8b"
 _FAULTS_LISTED = 5
+# What every solved row has; the others do not exist for every engine, fuel or bound.
+_FIGURES_OF_A_SOLVED_ROW = (
+    "fuel_l_per_100km", "fuel_corrected_l_per_100km", "co2_g_per_km", "soc_start", "soc_end", "engine_starts",
+    "bound_l_per_100km", "certificate", "solve_s",
+)  # fmt: skip
+_OVER_TIME = ("step_s", "speed_mps", "wheel_power_w", "missing_torque_nm")
+_OVER_VALUES = ("fuel_l_per_100km", "delta_percent", "nox_mg_per_km", "delta_nox_percent")
 
 
 def load_results(path: Path) -> Results:
@@ -36,19 +43,63 @@ def load_results(path: Path) -> Results:
 
 
 def _disagreements(results: Results) -> list[str]:
-    """Rows whose car is missing, and traces that are not as long as their cycle."""
-    faults = []
+    """What fits its own key but not the others: lists that differ in length, figures or a car that are missing."""
+    faults = [
+        fault
+        for name, car in results.cars.items()
+        for fault in _faults_of_car(printable(name), car)
+    ]
     for n, row in enumerate(results.rows):
-        if row.detail is None:
-            continue
-        car = results.cars.get(row.figures.architecture)
-        if car is None:
-            faults.append(f"rows.{n}: no car {printable(row.figures.architecture)!r}")
-            continue
-        steps, trace = len(car.time_s), row.detail.trace.model_dump()
-        lengths = {len(values) - (name == "soc") for name, values in trace.items()}
-        if lengths != {steps} or max(trace["operation"], default=0) >= len(results.operations):
-            faults.append(f"rows.{n}.detail.trace: not of {steps} steps, as car {car.name} has")
+        if row.detail is not None:
+            faults += [f"rows.{n}{fault}" for fault in _faults_of_row(results, row)]
+    if any(row.detail for row in results.rows) and not results.distance_m > 0:
+        faults.append("distance_m: not above 0")
+    for n, line in enumerate(results.sensitivity or []):
+        lists = [getattr(line, name) for name in _OVER_VALUES]
+        if len(line.values) < 2 or any(len(values) != len(line.values) for values in lists):
+            faults.append(f"sensitivity.{n}: not as many figures as values, two or more")
+    for n, front in enumerate(results.pareto or []):
+        if not front.points or not all(point.nox_weights for point in front.points):
+            faults.append(f"pareto.{n}.points: without points, or a point without weights")
+    return faults
+
+
+def _faults_of_car(name: str, car: CarFigures) -> list[str]:
+    faults, steps = [], len(car.time_s)
+    for key in _OVER_TIME:
+        if len(getattr(car, key)) != steps or not steps:
+            faults.append(f"cars.{name}.{key}: not of {steps} steps, or of none")
+    for key, drawn in (("engine", car.engine), ("machine", car.machine)):
+        speeds, torques = len(drawn.speed_radps), len(drawn.torque_nm)
+        over_speed = [
+            drawn.limit_nm,
+            drawn.least_nm,
+            drawn.efficiency,
+            *filter(None, [drawn.nox_kgpj]),
+        ]
+        over_torque = [*drawn.efficiency, *(drawn.nox_kgpj or [])]
+        if {*map(len, over_speed)} != {speeds} or {*map(len, over_torque)} != {torques}:
+            faults.append(f"cars.{name}.{key}: not of {speeds} speeds x {torques} torques")
+    return faults
+
+
+def _faults_of_row(results: Results, row: Row) -> list[str]:
+    """Faults of a row that was solved, each after the row's place."""
+    car, detail = results.cars.get(row.figures.architecture), row.detail
+    if car is None:
+        return [f": no car {printable(row.figures.architecture)!r}"]
+    faults = [
+        f".figures.{name}: missing"
+        for name in _FIGURES_OF_A_SOLVED_ROW
+        if getattr(row.figures, name) is None
+    ]
+    steps, trace = len(car.time_s), detail.trace.model_dump()
+    if {len(values) - (name == "soc") for name, values in trace.items()} != {steps}:
+        faults.append(f".detail.trace: not of {steps} steps, as car {printable(car.name)} has")
+    if not set(trace["operation"]) <= set(range(len(results.operations))):
+        faults.append(f".detail.trace.operation: beyond the {len(results.operations)} operations")
+    if not sum(share.time_s for share in detail.shares) > 0:
+        faults.append(".detail.shares: no time")
     return faults
 
 
