@@ -23,6 +23,17 @@ def shipped_folder(kind: str) -> Path:
     return installed if installed.is_dir() else _PACKAGE.parent / kind
 
 
+def place_shown(path: Path, beside: Path | None = None) -> str:
+    """A file as a report names it: a shipped one by its place among them, wherever they are installed.
+
+    Others as they were read; where a folder is given, from there, and by its name alone if it lies elsewhere.
+    """
+    for root in filter(None, (shipped_folder("architectures").parent, beside)):
+        if path.is_relative_to(root):
+            return printable(path.relative_to(root).as_posix())
+    return printable(path.name if beside and path.is_absolute() else str(path))
+
+
 def shipped_names(kind: str, suffix: str) -> list[str]:
     """Names of the shipped files of a kind, sorted."""
     return sorted(p.stem for p in shipped_folder(kind).glob(f"*{suffix}"))

@@ -11,7 +11,7 @@ from hevopt.architecture import Architecture
 from hevopt.case import Case
 from hevopt.cycle import Cycle
 from hevopt.errors import DataError
-from hevopt.files import printable, shipped_folder
+from hevopt.files import place_shown
 from hevopt.pages.energy import energy_of
 from hevopt.pages.maps import engine_map, machine_map
 from hevopt.pages.operation import (
@@ -104,7 +104,8 @@ class Collector:
             command=command,
             changes=list(changes),
             inputs={
-                _named(Path(file)): d for file, d in files_digests(cars, cycles, others).items()
+                place_shown(Path(file)): d
+                for file, d in files_digests(cars, cycles, others).items()
             },
             versions=versions(),
             operations=list(OPERATIONS),
@@ -123,12 +124,6 @@ class Collector:
                 for statement in (published_beside(comparison) if published else [])
             ],
         )
-
-
-def _named(path: Path) -> str:
-    """A shipped file by its place among them, wherever they are installed; others as they were read."""
-    root = shipped_folder("architectures").parent
-    return path.relative_to(root).as_posix() if path.is_relative_to(root) else printable(str(path))
 
 
 def _car(case: Case) -> CarFigures:

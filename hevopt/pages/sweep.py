@@ -3,11 +3,13 @@
 import base64
 import gzip
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from hevopt.files import place_shown
 from hevopt.pages.page import render
 from hevopt.pages.sweep_alerts import alerts
 from hevopt.pages.sweep_data import (
@@ -75,13 +77,31 @@ def sweep_page(sweep: Sweep) -> str:
         failures_all=sweep.tally.counts["failed"] + sweep.tally.counts["infeasible"],
         limits={"best": BEST_LISTED, "pruned": PRUNED_LISTED, "cases": CASES_MAX, "designs": DESIGNS_MAX,
                 "lines": LINES_MAX, "best_lines": BEST_LINES, "effects": EFFECTS_DRAWN},
-        facts={k: v for k, v in sweep.meta.items() if k not in _SHOWN_APART},
-        inputs=sweep.inputs,
+        facts=_facts(sweep),
+        inputs=_inputs(sweep),
         computed_by=_entries(sweep.meta.get("versions")),
         versions=versions(),
         same_code=sweep.meta.get("code_digest") == code_digest(),
         table=Markup(base64.b64encode(_packed(table)).decode()),
     )  # fmt: skip
+
+
+def _study_file(sweep: Sweep) -> Path:
+    return Path(sweep.meta.get("study_file", ""))
+
+
+def _facts(sweep: Sweep) -> dict[str, str]:
+    """What the store knows; the study file by its name, for a page may be handed on and folders are the user's."""
+    facts = {k: v for k, v in sweep.meta.items() if k not in _SHOWN_APART}
+    if "study_file" in facts:
+        facts["study_file"] = _study_file(sweep).name
+    return facts
+
+
+def _inputs(sweep: Sweep) -> list[tuple[str, str]]:
+    """Files and their digests, each from the study's folder on."""
+    folder = _study_file(sweep).parent
+    return [(place_shown(Path(file), folder), digest) for file, digest in sweep.inputs.items()]
 
 
 def _entries(text: str | None) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import re
 from dataclasses import fields
 from time import perf_counter
@@ -14,6 +15,7 @@ from page_helpers import Opened, until
 from typer.testing import CliRunner
 
 from hevopt.cli import app
+from hevopt.files import shipped_folder
 from hevopt.pages import sweep_data, sweep_drawing
 from hevopt.pages.page import fixed
 from hevopt.pages.sweep import sweep_page, unit_of
@@ -633,3 +635,21 @@ def test_a_weight_of_which_no_design_follows_says_that_there_is_nothing_to_show(
     found.page.select_option("#parallel-weight", "1")
     assert found.page.locator("#kept").inner_text().startswith("2 designs are drawn.")
     assert found.trouble == []
+
+
+def test_the_page_names_no_folder_of_the_user():
+    shipped = str(shipped_folder("architectures") / "C2.toml")
+    study, car = "/home/x/studies/study.toml", "/home/x/studies/cars/mine.toml"
+    files = {study: "1", car: "2", "/home/x/nedc.csv": "3", shipped: "4", "local.csv": "5"}
+    sweep = sweep_of([solved(0, 4.0)], inputs=json.dumps(files), study_file=study)
+    page = sweep_page(sweep)
+    assert "/home/x" not in page and ">study_file</th><td><code>study.toml<" in page
+    names = re.findall('<th scope="row">(.*?)</th><td><code>[1-5]<', page)
+    assert names == [
+        "study.toml",
+        "cars/mine.toml",
+        "nedc.csv",
+        "architectures/C2.toml",
+        "local.csv",
+    ]
+    assert list(sweep.inputs) == list(files)
