@@ -112,6 +112,19 @@ def test_a_caption_is_no_wider_than_the_box_its_table_scrolls_in(nedc, opened):
     assert len(over) > 5 and max(over) <= 0.5
 
 
+def test_tables_are_counted_where_the_count_goes_on(shown):
+    counted, lost = shown.page.evaluate(
+        """() => {
+          const counts = (e, part) => getComputedStyle(e, part).counterIncrement;
+          const inside = [...document.querySelectorAll('.scroll *')];
+          return [[...document.querySelectorAll('table')].map(table => counts(table.closest('.scroll'))),
+            inside.filter(e => [null, '::before'].some(part => counts(e, part) !== 'none')).length];
+        }"""
+    )
+    # What is counted within a container counts from its beginning: every table would be the first.
+    assert set(counted) == {"table 1"} and lost == 0
+
+
 def test_long_names_are_short_in_axes_and_legends_and_whole_where_the_mouse_rests(
     nedc, opened, tmp_path
 ):
