@@ -63,7 +63,7 @@ def landscape(job, guard):
             "objective_bound_l_per_100km": 0.99 * figure,
         }
         if case.strategy == "bound":
-            row["objective_l_per_100km"] = None
+            row |= {"strategy": "bound", "objective_l_per_100km": None}
         outcomes.append(Outcome(case.key, "ok", row, None, 0.001))
     return outcomes
 

@@ -75,7 +75,11 @@ def _effects(results: Results) -> dict[str, list[Sensitivity]]:
     for line in results.sensitivity or []:
         effects.setdefault(f"{line.architecture} {line.strategy}", []).append(line)
     for lines in effects.values():
-        lines.sort(key=lambda line: -max(map(abs, line.delta_percent)))
+        lines.sort(
+            key=lambda line: (
+                -max((abs(d) for d in line.delta_percent if d is not None), default=0.0)
+            )
+        )
     return effects
 
 

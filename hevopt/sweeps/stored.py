@@ -26,6 +26,7 @@ class _StoredRow(BaseModel):
     fuel_corrected_l_per_100km: float | None
     nox_mg_per_km: float | None = None
     objective_l_per_100km: float | None
+    objective_bound_l_per_100km: float
 
     @model_validator(mode="after")
     def _solved(self):
