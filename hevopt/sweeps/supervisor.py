@@ -103,6 +103,8 @@ class _Process:
         # What it says on its way out, for the error of the case.
         self._errors = tempfile.TemporaryFile()
         environment = os.environ | ONE_THREAD
+        # Dask has its workers give memory back at once, which costs a process that solves a third of its speed.
+        environment.pop("MALLOC_TRIM_THRESHOLD_", None)
         environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
         with theirs:
             self._running = subprocess.Popen(
