@@ -9,7 +9,7 @@ import typer
 from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
-from hevopt.files import printable, shown
+from hevopt.files import is_path, printable, shown
 
 if TYPE_CHECKING:
     from hevopt.imports.map_import import Request
@@ -93,7 +93,7 @@ def import_map(
     sources = [file, *(source.path for source in request.extra.values())]
     out = _beside(file, ".toml") if out is None else out
     plot = _beside(out, ".png")
-    check_outs({"--out": out, "the plot": plot}, sources)
+    check_outs({"--out": out, "the plot": plot}, [*sources, *_own_file(like)])
     _check_own(out, plot)
     imported = import_engine(request) if kind == "engine" else import_machine(request)
     said = coverage(imported)
@@ -153,7 +153,7 @@ def coastdown(
     from hevopt.imports.component_text import component_text
     from hevopt.writing import check_outs, write_whole
 
-    check_outs({"--out": out, "--plot": plot}, files)
+    check_outs({"--out": out, "--plot": plot}, [*files, *_own_file(like)])
     kind = None if plot is None else _picture_kind(plot)
     values = _values(given) | {
         key: value
@@ -257,6 +257,11 @@ def _beside(path: Path, suffix: str) -> Path:
     if not path.stem or path.stem == "..":
         raise DataError(f"{path}: not the name of a file")
     return path.with_suffix(suffix)
+
+
+def _own_file(like: str | None) -> list[str]:
+    """The file that --like names; none where it is a shipped component."""
+    return [like] if like is not None and is_path(like, ".toml") else []
 
 
 def _check_own(out: Path, plot: Path) -> None:

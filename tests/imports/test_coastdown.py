@@ -307,6 +307,10 @@ BAD = {
     "directions twice": (lambda r: r, (*MASS, "--directions", "+,-"), ["in a column and in --directions"]),
     "car": (lambda r: r, (*MASS, "--out", "x.toml"), ["the car file needs tyre_radius_m", "--like NAME"]),
     "own input": (lambda r: r, (*MASS, "--plot", "c.csv"), ["--plot c.csv is the file that c.csv is read from"]),
+    "own model": (
+        lambda r: r, (*MASS, "--like", "./like.toml", "--out", "like.toml"),
+        ["--out like.toml is the file that ./like.toml is read from"],
+    ),
     "column": (lambda r: r, (*MASS, "--column", "speed=v"), ["no column 'v'"]),
     "unit": (lambda r: r, (*MASS, "--unit", "speed=rpm"), ["unit 'rpm' is one of rotation"]),
 }  # fmt: skip
