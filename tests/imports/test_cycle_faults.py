@@ -1,33 +1,10 @@
 """Faults of a drive: what a log really holds is found by line, what an ordinary sensor writes is none."""
 
-from pathlib import Path
 from time import process_time
 
 import numpy as np
 import pytest
-
-from hevopt.errors import DataError
-from hevopt.imports.cycle_import import import_cycle
-
-DRIVE_KMH = [0, 0, 9, 18, 27, 36, 36, 27, 9, 0, 0, 0, 18, 36, 18, 0]
-PLAIN = "".join(f"{t},{v}\n" for t, v in enumerate(DRIVE_KMH))
-
-
-def imported(tmp_path: Path, text: str, name="drive.csv", **options):
-    path = tmp_path / name
-    path.write_text(text)
-    return import_cycle(path, **options)
-
-
-def refusal(tmp_path, text, name="drive.csv", **options):
-    with pytest.raises(DataError) as error:
-        imported(tmp_path, text, name, **options)
-    return str(error.value)
-
-
-def columns(text):
-    """The cycle file without its comments."""
-    return "\n".join(line for line in text.splitlines() if not line.startswith("#"))
+from drive_files import DRIVE_KMH, PLAIN, columns, imported, refusal
 
 
 @pytest.mark.parametrize("cell", ["20s", "abc", "1e999", "0:20"])

@@ -7,6 +7,7 @@ import numpy as np
 import openpyxl
 import pytest
 import scipy.io
+from drive_files import DRIVE_KMH, PLAIN, columns, imported, refusal
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -20,9 +21,6 @@ QUICK = settings(
     max_examples=80, deadline=None, derandomize=True, database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )  # fmt: skip
-# A short drive with a standstill, in km/h at whole seconds.
-DRIVE_KMH = [0, 0, 9, 18, 27, 36, 36, 27, 9, 0, 0, 0, 18, 36, 18, 0]
-PLAIN = "".join(f"{t},{v}\n" for t, v in enumerate(DRIVE_KMH))
 
 
 @st.composite
@@ -39,23 +37,6 @@ def drives(draw, acceleration_mps2):
 
 def trapezoid(time_s, speed_mps):
     return float(np.trapezoid(speed_mps, time_s))
-
-
-def imported(tmp_path, text, name="drive.csv", **options):
-    path = tmp_path / name
-    path.write_text(text)
-    return import_cycle(path, **options)
-
-
-def refusal(tmp_path, text, name="drive.csv", **options):
-    with pytest.raises(DataError) as error:
-        imported(tmp_path, text, name, **options)
-    return str(error.value)
-
-
-def columns(text):
-    """The cycle file without its comments."""
-    return "\n".join(line for line in text.splitlines() if not line.startswith("#"))
 
 
 @QUICK
