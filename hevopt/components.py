@@ -10,8 +10,9 @@ from hevopt.car_file import CarFile
 from hevopt.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
 from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
+from hevopt.file_fields import FullLoadFile
 from hevopt.gearbox_file import GearboxFile
-from hevopt.machine import LossGrid, Machine
+from hevopt.machine import LossGrid, Machine, TorqueCurve
 from hevopt.machine_file import LossMapFile, MachineFile
 from hevopt.scaling import scaled_engine, scaled_machine
 from hevopt.transmission import Gearbox
@@ -118,8 +119,13 @@ def machine_of(data: MachineFile) -> Machine:
         data.inertia_kgm2,
         None if data.kind == "efficiency" else loss,
         data.efficiency,
+        None if data.full_load is None else _torque_curve(data.full_load),
     )
     return machine if data.scale is None else scaled_machine(machine, data.scale.factor)
+
+
+def _torque_curve(data: FullLoadFile) -> TorqueCurve:
+    return TorqueCurve(np.array(data.speed_rpm) * TO_SI["_rpm"][1], np.array(data.torque_nm))
 
 
 def _loss_grid(data: LossMapFile) -> LossGrid:

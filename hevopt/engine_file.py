@@ -10,6 +10,7 @@ from hevopt.datafile import FileModel
 from hevopt.file_fields import (
     Coefficient,
     Curve,
+    FullLoadFile,
     Name,
     NotNegative,
     ScaleFactor,
@@ -28,21 +29,6 @@ class FuelFile(FileModel):
     heating_value_mjpkg: Annotated[float, Field(ge=5, le=150)]
     density_kgpl: Annotated[float, Field(ge=0.05, le=2)]
     co2_kgpkg: Annotated[float, Field(ge=0, le=5)]
-
-
-class FullLoadFile(FileModel):
-    speed_rpm: Speeds
-    torque_nm: Curve
-
-    @model_validator(mode="after")
-    def _curve(self):
-        if len(self.speed_rpm) != len(self.torque_nm):
-            raise ValueError("speed_rpm and torque_nm must have one length")
-        if (np.diff(self.speed_rpm) <= 0).any():
-            raise ValueError("speed_rpm must increase")
-        if min(self.torque_nm) <= 0:
-            raise ValueError(f"every torque_nm must be > 0, found {min(self.torque_nm):g}")
-        return self
 
 
 class FuelCoefficientsFile(FileModel):

@@ -111,3 +111,20 @@ class ScaleFile(FileModel):
     def factor(self) -> float:
         """The factor given."""
         return next(value for value in self.model_dump().values() if value is not None)
+
+
+class FullLoadFile(FileModel):
+    """The highest torque over speed."""
+
+    speed_rpm: Speeds
+    torque_nm: Curve
+
+    @model_validator(mode="after")
+    def _curve(self):
+        if len(self.speed_rpm) != len(self.torque_nm):
+            raise ValueError("speed_rpm and torque_nm must have one length")
+        if (np.diff(self.speed_rpm) <= 0).any():
+            raise ValueError("speed_rpm must increase")
+        if min(self.torque_nm) <= 0:
+            raise ValueError(f"every torque_nm must be > 0, found {min(self.torque_nm):g}")
+        return self

@@ -133,6 +133,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "power_max_w": ("W", "highest mechanical power, either direction"),
         "torque_max_nm": ("Nm", "highest torque, either direction; without it only power limits"),
         "speed_max_rpm": ("1/min", "highest speed; without it none"),
+        "full_load": ("", "largest torque over speed, either direction, beside these limits: its first holds down "
+                      "to rest, beyond its last there is none"),
         "inertia_kgm2": ("kg m²", "moment of inertia of the rotor"),
         "efficiency": ("-", "mechanical to electric and back; kind efficiency only"),
         "loss_c0_w": ("W", "c0 of loss = c0 + c1 w + c2 w² + c3 T², w in rad/s, T in Nm; kind loss only"),

@@ -26,11 +26,23 @@ class LossGrid:
     loss_w: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TorqueCurve:
+    """The largest torque of either sign over speed; the first holds down to rest, there is none beyond the last.
+
+    speed_radps, torque_nm: (point,)
+    """
+
+    speed_radps: Array
+    torque_nm: Array
+
+
 @dataclass(frozen=True, slots=True)
 class Machine:
     """A machine by its loss c0 + c1 w + c2 w² + c3 T² or a measured map, or by one efficiency for either direction.
 
     loss: (4,) c0 (W), c1 (W s), c2 (W s²), c3 (W/(Nm)²), or a map; None where `efficiency` is given.
+    full_load: what holds beside the limits of torque and power; None for these alone.
     """
 
     name: str
@@ -40,12 +52,17 @@ class Machine:
     inertia_kgm2: float
     loss: tuple[float, float, float, float] | LossGrid | None
     efficiency: float | None
+    full_load: TorqueCurve | None = None
 
 
 def torque_limit_nm(machine: Machine, speed_radps: Array) -> Array:
-    """Largest torque of either sign at a speed, by torque and by power."""
+    """Largest torque of either sign at a speed, by torque, by power and by the full-load curve."""
     by_power = machine.power_max_w / np.maximum(speed_radps, 1e-9)
-    return np.minimum(machine.torque_max_nm, by_power)
+    limit = np.minimum(machine.torque_max_nm, by_power)
+    if machine.full_load is None:
+        return limit
+    curve = machine.full_load
+    return np.minimum(limit, np.interp(speed_radps, curve.speed_radps, curve.torque_nm, right=0.0))
 
 
 def loss_w(machine: Machine, torque_nm: Array, speed_radps: Array) -> Array:

@@ -9,6 +9,7 @@ from hevopt.datafile import FileModel
 from hevopt.file_fields import (
     Curve,
     Fraction,
+    FullLoadFile,
     KeysOfKind,
     Name,
     NotNegative,
@@ -61,6 +62,7 @@ class MachineFile(FileModel):
     power_max_w: Positive
     torque_max_nm: Positive | None = None
     speed_max_rpm: Positive | None = None
+    full_load: FullLoadFile | None = None
     inertia_kgm2: Annotated[float, Field(ge=0, le=100)] = 0.0
     efficiency: Fraction | None = None
     loss_c0_w: NotNegative | None = None

@@ -52,10 +52,12 @@ def scaled_machine(machine: Machine, factor: float) -> Machine:
     elif loss is not None:
         c0, c1, c2, c3 = loss
         loss = (factor * c0, factor * c1, factor * c2, c3 / factor)
+    curve = machine.full_load
     return replace(
         machine,
         power_max_w=factor * machine.power_max_w,
         torque_max_nm=factor * machine.torque_max_nm,
         inertia_kgm2=factor * machine.inertia_kgm2,
         loss=loss,
+        full_load=None if curve is None else replace(curve, torque_nm=factor * curve.torque_nm),
     )

@@ -45,6 +45,8 @@ def envelope_of(file: EngineFile | MachineFile, speed_radps: Array | None = None
         return Envelope(speed, low, np.interp(rpm, full.speed_rpm, full.torque_nm))
     with np.errstate(divide="ignore"):
         high = np.minimum(file.torque_max_nm, file.power_max_w / speed)
+    if (full := file.full_load) is not None:
+        high = np.minimum(high, np.interp(rpm, full.speed_rpm, full.torque_nm, right=0.0))
     return Envelope(speed, -high, high)
 
 

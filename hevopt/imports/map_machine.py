@@ -79,14 +79,19 @@ def import_machine(request: Request) -> Imported:
         "inertia_kgm2": "assumed: no --like" if like is None else f"from {request.like}",
     }
     base, origins = with_given(base, origins, request.given)
-    contents = base | {
-        "loss_map": {
-            "speed_rpm": rpm_list(grid.speed_radps),
-            "torque_nm": grid.torque_nm.tolist(),
-            "symmetric": symmetric,
-            "loss_w": grid.values.tolist(),
+    curve = {} if limit is None else {"full_load": _curve(limit)}
+    contents = (
+        base
+        | curve
+        | {
+            "loss_map": {
+                "speed_rpm": rpm_list(grid.speed_radps),
+                "torque_nm": grid.torque_nm.tolist(),
+                "symmetric": symmetric,
+                "loss_w": grid.values.tolist(),
+            }
         }
-    }
+    )
     file = checked(f"component from {request.source.path.name}", contents, MachineFile)
     return Imported(contents, file, origins, tuple(notes), _both_signs(grid), measured)
 
@@ -105,9 +110,14 @@ def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
         row[(torque > top) | (torque < low)] = np.nan
     gone = int((known & np.isnan(values)).sum())
     return Grid(speed, torque, values), [
-        "full-load curve: torque_max_nm, power_max_w and speed_max_rpm are its largest torque, power and speed; "
+        "full-load curve: torque is straight between its points, and power nowhere above that of all of them; "
+        "torque_max_nm, power_max_w and speed_max_rpm are its largest torque, power and speed; "
         f"{gone} cells of the map wholly beyond it are left out"
     ]
+
+
+def _curve(limit: Curve) -> dict[str, list[float]]:
+    return {"speed_rpm": rpm_list(limit.speed_radps), "torque_nm": limit.torque_nm.tolist()}
 
 
 def _check_generating(request: Request, points: Points) -> None:

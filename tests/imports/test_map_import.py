@@ -569,6 +569,8 @@ def test_a_machines_full_load_curve_sets_its_limits_and_ends_its_map(hevopt):
         held = machine_model.loss_w(machine, sign * limit * 0.999, rpm * RPM)
         assert np.isfinite(held).all()
         assert np.isnan(machine_model.loss_w(machine, np.array(sign * 61.0), np.array(4000 * RPM)))
+    # Between lines of the map as well, no torque beyond the curve.
+    assert machine_model.torque_limit_nm(machine, np.array(4500 * RPM)) == pytest.approx(25)
 
 
 def test_a_shortfall_is_driven_with_what_a_masked_map_covers(hevopt):

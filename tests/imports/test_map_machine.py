@@ -54,6 +54,31 @@ def test_a_measured_loss_without_torque_is_kept(hevopt):
     np.testing.assert_allclose(found, still, rtol=1e-6)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_the_full_load_curve_is_the_limit_and_the_map_reaches_up_to_it(hevopt, scale):
+    rpm, torque = np.meshgrid([0.0, *SPEEDS], np.linspace(-120, 120, 25))
+    loss = machine_model.loss_w(MACHINE, torque, rpm * RPM)
+    columns = "speed [rpm],torque [Nm],loss [W]", rpm.ravel(), torque.ravel(), loss.ravel()
+    write("m.csv", *columns)
+    # A curve that bends where the map has no line, partly well below the hyperbola of its largest power.
+    curve_rpm, curve_nm = np.array([0, 1100, 2700, 6000]), np.array([97.0, 97.0, 41.0, 12.0])
+    write("full.csv", "speed [rpm],torque [Nm]", curve_rpm, curve_nm)
+    seen = hevopt(*IMPORT, "--full-load", "full.csv")
+    assert seen.status == 0 and "full-load curve: torque is straight" in seen.out, seen
+    car = load_architecture(car_with("machine", "m.toml"), {"machine.scale.power": scale})
+    speed = np.linspace(0, 6000, 241)
+    limit = machine_model.torque_limit_nm(car.machine, speed * RPM)
+    most_w = (curve_nm * curve_rpm * RPM).max()
+    straight = np.interp(speed, curve_rpm, curve_nm)
+    expected = np.minimum(straight, most_w / np.maximum(speed * RPM, 1e-9))
+    assert (expected < straight).any() and (expected == straight).any()
+    np.testing.assert_allclose(limit, scale * expected, rtol=1e-5)
+    for sign in (1, -1):
+        found = machine_model.loss_w(car.machine, sign * limit, speed * RPM)
+        assert not np.isnan(found).any()
+    assert machine_model.torque_limit_nm(car.machine, np.array([6001 * RPM])) == 0
+
+
 def test_electric_power_without_its_sign_while_generating_is_refused(hevopt):
     rpm, torque, power, loss = bench()
     write("m.csv", "speed [rpm],torque [Nm],electric power [W]", rpm, torque, abs(power + loss))
