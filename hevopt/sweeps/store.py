@@ -23,6 +23,7 @@ from time import monotonic
 from typing import Any
 
 from hevopt.errors import DataError
+from hevopt.files import printable
 from hevopt.sweeps.jobs import Outcome, Planned
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.stored import loaded
@@ -195,18 +196,19 @@ def told(path: Path) -> Iterator[None]:
 
 
 def _advice(error: sqlite3.Error) -> str:
-    name = getattr(error, "sqlite_errorname", "")
+    # What a damaged file holds, SQLite quotes as it is.
+    name, said = getattr(error, "sqlite_errorname", ""), printable(str(error))
     if name.startswith("SQLITE_NOTADB"):
         return "not a store of a sweep, nor an SQLite file; name another"
     if name.startswith("SQLITE_CORRUPT"):
-        return f"damaged ({error}); keep a copy, and recover it with the tools of SQLite"
+        return f"damaged ({said}); keep a copy, and recover it with the tools of SQLite"
     if name.startswith("SQLITE_FULL") or name.startswith("SQLITE_IOERR"):
         return (
-            f"cannot be written ({error}); results stored before are safe: make room on the disk, and run "
+            f"cannot be written ({said}); results stored before are safe: make room on the disk, and run "
             "the same command again"
         )
     if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
-        return f"cannot be opened or written ({error}); name a store that can, with --store"
+        return f"cannot be opened or written ({said}); name a store that can, with --store"
     if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
-        return f"another program holds it ({error}); close that, and run the same command again"
-    return f"SQLite: {error}"
+        return f"another program holds it ({said}); close that, and run the same command again"
+    return f"SQLite: {said}"

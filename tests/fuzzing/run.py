@@ -9,6 +9,7 @@ What it has found, all mended since:
 - A TOML key of 100 000 dotted parts takes 22 GB in tomllib; such keys are refused before.
 - A KeyError in `validate`; two RuntimeWarnings on maps that are zero all over.
 - Spoilt stores of sweeps that SQLite reads well ended `report` and `sweep --status` in a JSONDecodeError.
+- Of a store whose schema is spoilt, SQLite's message quotes control characters.
 - `coastdown` named every column of a file with thousands, in a message of 22 000 characters.
 """
 

@@ -87,6 +87,12 @@ def test_a_result_is_on_disk_after_half_a_second_or_two_hundred_rows(tmp_path, m
         assert on_disk() == 201
 
 
+def test_what_sqlite_quotes_of_a_damaged_file_is_printable(tmp_path):
+    with pytest.raises(DataError) as found, store_module.told(tmp_path / "s.sqlite"):
+        raise sqlite3.OperationalError('unrecognized token: "\x01\x1b[31m"')
+    assert str(found.value).endswith('SQLite: unrecognized token: "??[31m"')
+
+
 def test_another_plan_keeps_the_results_of_the_former(tmp_path):
     path = filled(tmp_path / "s.sqlite", [ok("0dp"), ok("1dp")])
     with open_store(path) as store:
