@@ -162,7 +162,7 @@ def _run(
     """How it went. Raises Stopped."""
     from hevopt.sweeps.lock import locked
     from hevopt.sweeps.reading import open_to_read
-    from hevopt.sweeps.run import Watch, begin, inputs_of, plan_of, run_sweep
+    from hevopt.sweeps.run import Watch, begin, plan_of, run_sweep
     from hevopt.sweeps.store import open_store
     from hevopt.sweeps.study_file import read_study
     from hevopt.writing import check_outs
@@ -173,7 +173,7 @@ def _run(
             with open_to_read(store):
                 pass  # one message at once, not after minutes of planning, where it is no store
         plan = plan_of(contents, prune=prune, progress=progress.plan)
-        check_outs({"--export": export}, inputs_of(plan))
+        check_outs({"--export": export}, plan.inputs)
         with open_store(store) as opened:
             begin(plan, opened, command_line())
             if prune and not plan.prunable:

@@ -1,6 +1,5 @@
 """What a sweep came to: as it ends, by `--status`, or as a table in a file."""
 
-import json
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -82,11 +81,11 @@ def show_status(path: Path) -> None:
 def export_store(store: Path, out: Path) -> None:
     """Write the cases of a store as a table."""
     from hevopt.sweeps.export import check_export, export
-    from hevopt.sweeps.reading import open_to_read
+    from hevopt.sweeps.reading import inputs_in, open_to_read
     from hevopt.writing import check_outs
 
     check_outs({"--export": out}, [store])
     check_export(out)
     with open_to_read(store) as reader:
-        check_outs({"--export": out}, json.loads(reader.meta().get("inputs", "{}")))
+        check_outs({"--export": out}, inputs_in(reader.meta()))
         write(f"{export(reader, out)} cases written to {out}")

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,7 +18,7 @@ from hevopt.files import printable
 from hevopt.sweeps.export import csv_of
 from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
 from hevopt.sweeps.prune import Pruned
-from hevopt.sweeps.reading import Record, open_to_read
+from hevopt.sweeps.reading import Record, inputs_in, open_to_read
 from hevopt.sweeps.reasons import Reasons
 
 Array = NDArray[np.float64]
@@ -121,7 +120,7 @@ class Sweep:
     @property
     def inputs(self) -> dict[str, str]:
         """File -> SHA-256, of the files that it was made from."""
-        return json.loads(self.meta.get("inputs", "{}"))
+        return inputs_in(self.meta)
 
 
 def load_sweep(path: Path) -> Sweep:

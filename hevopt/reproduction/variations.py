@@ -106,10 +106,6 @@ def without(problem: Problem, unwanted: NDArray[np.bool_]) -> Problem:
     return replace(problem, table=replace(table, reject=table.reject | bits))
 
 
-def _is_hybrid(car: Architecture) -> bool:
-    return "power_management" in car.functions
-
-
 def _times(car: Architecture, component: str, keys: tuple[str, ...], factor: float) -> dict:
     table = car.contents[component]
     return {f"{component}.{key}": factor * table[key] for key in keys if key in table}

@@ -16,7 +16,7 @@ NOX_WEIGHT = "nox_weight"
 # Not a strategy but the certified bound alone.
 BOUND = "bound"
 # What a stored row has beside the fields of rows.Row; see `Outcome`.
-OBJECTIVE, OBJECTIVE_BOUND = FIGURES = ("objective_l_per_100km", "objective_bound_l_per_100km")
+FIGURES = ("objective_l_per_100km", "objective_bound_l_per_100km")
 
 
 class Case(NamedTuple):

@@ -1,5 +1,6 @@
 """Reading a store: while a sweep writes to it, after one was killed, on a disk that cannot be written."""
 
+import json
 import os
 import shutil
 import sqlite3
@@ -37,6 +38,11 @@ class Record:
     row: Mapping[str, Any] | None
     error: str | None
     seconds: float | None
+
+
+def inputs_in(meta: Mapping[str, str]) -> dict[str, str]:
+    """File -> SHA-256, of the files that a sweep was made from, by what its store knows of it."""
+    return json.loads(meta.get("inputs", "{}"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,12 +39,16 @@ class Execution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """All cases of a study: jobs that run them, and which case answers for which design."""
+    """All cases of a study: jobs that run them, and which case answers for which design.
+
+    inputs: file -> SHA-256, of all files that it is made from
+    """
 
     study: SweepStudy
     designs: Designs
     jobs: list[Job]
     planned: list[Planned]
+    inputs: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def prunable(self) -> bool:
@@ -113,14 +117,8 @@ def plan_of(
         jobs.append(job)
         planned += cases
         progress(len(jobs), len(groups) * len(study.cycles))
-    return Plan(study, designs, jobs, planned)
-
-
-def inputs_of(plan: Plan) -> Mapping[str, str]:
-    """File -> SHA-256, of all files that a plan is made from."""
-    study = plan.study
-    cycles = map(load_cycle, study.cycles)
-    return files_digests(cars_of(study, plan.designs), cycles, [study.source])
+    inputs = files_digests(cars_of(study, designs), map(load_cycle, study.cycles), [study.source])
+    return Plan(study, designs, jobs, planned, inputs)
 
 
 def begin(plan: Plan, store: Store, command: str) -> None:
@@ -132,7 +130,7 @@ def begin(plan: Plan, store: Store, command: str) -> None:
         "study_digest": digest(text),
         "code_digest": code_digest(),
         "versions": json.dumps(versions()),
-        "inputs": json.dumps(inputs_of(plan)),
+        "inputs": json.dumps(plan.inputs),
         "command": command,
         "study_file": str(study.source.absolute()),
     }

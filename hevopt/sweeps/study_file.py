@@ -94,7 +94,10 @@ def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
     cycles = _cycles(folder, good.get("cycles", ()), faults)
     faults += _strategy_faults(good.get("strategies", ()), car)
     if car is not None:
-        load = lambda changes: load_architecture(architecture, located_changes(folder, changes))  # noqa: E731
+
+        def load(changes: Mapping[str, Any]) -> Architecture:
+            return load_architecture(architecture, located_changes(folder, changes))
+
         faults += parameter_faults(load, parameters)
     constraints: tuple[Constraint, ...] = ()
     if parameters and len(parameters) == len(contents["parameters"]):
