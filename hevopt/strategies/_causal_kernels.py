@@ -111,7 +111,7 @@ def adaptive(first, cost, power, drain, step_s, switch_kg, allowed, speed, braki
             slowed += max(speed[k - 1] ** 2 - speed[k] ** 2, 0.0)
             since += step_s[k - 1]
             span_s += step_s[k - 1]
-        while span_s > p.window_s:
+        while oldest < k and span_s > p.window_s:
             span_s -= step_s[oldest]
             oldest += 1
         if span_s > 0.9 * p.window_s and since > 0.25 * p.window_s:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from hevopt._prices_kernels import shortest_path
 from hevopt.choices import choices_of
-from hevopt.errors import SolverError
 from hevopt.prices import drain_at_j, one_price_dual, typical_price_kgpj
 from hevopt.problem import Plan, Problem
 from hevopt.simulation import total_cost_kg
@@ -24,6 +23,9 @@ from hevopt.strategies._rollout import reach_of, roll
 Array = NDArray[np.float64]
 _FACTOR_TOLERANCE = 1e-7
 _BRACKET_STEPS_MAX = 60
+_HALVINGS_MAX = 100
+# A factor below this share of the guess decides among free controls alone, as the least factor above 0 does.
+_NEGLIGIBLE = 1e-9
 _ENERGY_ROUNDING = 1e-12
 
 
@@ -95,23 +97,27 @@ def _change_once(search: _Search, before: float, after: float) -> None:
 
 
 def _neutral_factors(search: _Search, guess: float) -> tuple[float, float]:
-    """Neighbouring factors of which the cheaper leaves too little charge and the dearer enough."""
+    """Neighbouring factors of which the cheaper leaves too little charge and the dearer enough.
+
+    Where no factor tried leaves enough, both are the dearest.
+    """
     every = np.ones(search.choices.steps)
     if search.surplus_j(0.0 * every) >= 0:
         return 0.0, 0.0
     cheap, dear = 0.98 * guess, 1.02 * guess
     while search.surplus_j(cheap * every) >= 0:
+        if cheap <= _NEGLIGIBLE * guess:
+            return 0.0, cheap
         cheap *= 0.8
     for _ in range(_BRACKET_STEPS_MAX):
         if search.surplus_j(dear * every) >= 0:
             break
         dear *= 1.25
     else:
-        raise SolverError(
-            f"ecms: no equivalence factor up to {dear:g} kg/J reaches the asked end charge; "
-            "use dp, which plans for it"
-        )
-    while dear - cheap > _FACTOR_TOLERANCE * dear:
+        return dear, dear
+    for _ in range(_HALVINGS_MAX):
+        if dear - cheap <= _FACTOR_TOLERANCE * dear:
+            break
         middle = (cheap + dear) / 2
         if search.surplus_j(middle * every) >= 0:
             dear = middle
