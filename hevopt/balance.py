@@ -123,9 +123,12 @@ def machine_torque_range(
 
 
 def least_engine_torque(architecture: Architecture, joint: Joint) -> Array:
-    """(time,) drag torque where the clutch is locked (fuel cut); else 0, the engine keeps itself turning."""
+    """(time,) drag torque where the clutch is locked (fuel cut); else 0, the engine keeps itself turning.
+
+    0 too at speeds beyond a measured map's, where no torque of the engine is used.
+    """
     drag = engine_model.drag_torque_nm(architecture.engine, joint.engine_speed_radps)
-    return np.where(joint.locked, drag, 0.0)
+    return np.where(joint.locked & ~np.isnan(drag), drag, 0.0)
 
 
 def machine_torque_at(
@@ -175,8 +178,10 @@ def deliverable_nm(architecture: Architecture, demand: Demand, joint: Joint) -> 
     usable = joint.connected & (speed <= machine.speed_max_radps) & bool(motoring)
     top = np.where(usable, machine_model.torque_limit_nm(machine, speed), 0.0)
     if architecture.coupling.kind == "none":
-        top = machine_model.generating_torque_nm(
-            machine, architecture.vehicle.auxiliary_power_w, speed
+        top = np.nan_to_num(
+            machine_model.generating_torque_nm(
+                machine, architecture.vehicle.auxiliary_power_w, speed
+            )
         )
     net = top - machine.inertia_kgm2 * joint.machine_accel_radps2
     covered = engine_model.covered_torque_nm(architecture.engine, joint.engine_speed_radps)

@@ -12,7 +12,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.grid import highest_known, interpolated
+from hevopt.grid import along, highest_known, interpolated
 
 Array = NDArray[np.float64]
 _PA_PER_BAR = 1e5
@@ -105,9 +105,9 @@ def covered_torque_nm(engine: Engine, speed_radps: Array) -> Array:
 
 
 def drag_torque_nm(engine: Engine, speed_radps: Array) -> Array:
-    """Torque of the turning engine without fuel, negative."""
+    """Torque of the turning engine without fuel, negative; NaN at speeds beyond a measured grid's."""
     if isinstance(engine.fuel, EngineGrid):
-        return np.interp(speed_radps, engine.fuel.speed_radps, engine.fuel.motoring_torque_nm)
+        return along(engine.fuel.speed_radps, engine.fuel.motoring_torque_nm, speed_radps)
     k, cm = engine.fuel, _piston_speed_mps(engine, speed_radps)
     return (k.l + k.l2 * cm**2) * _PA_PER_BAR * engine.displacement_m3 / (4 * pi)
 
@@ -150,14 +150,19 @@ def nox_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> Array:
 
 
 def best_torque_nm(engine: Engine, speed_radps: Array) -> Array:
-    """Torque of highest efficiency at each speed, from a grid of 1 % of full load."""
+    """Torque of highest efficiency at each speed, from a grid of 1 % of full load.
+
+    Of the closest speeds that a measured grid knows where it knows nothing: no control is possible there.
+    """
     speeds = np.linspace(engine.full_load_speed_radps[0], engine.speed_max_radps, 101)[:, None]
     torques = full_load_torque_nm(engine, speeds) * np.linspace(0.01, 1.0, 100)
     fuel = fuel_kgps(engine, torques, speeds)
     with np.errstate(invalid="ignore", divide="ignore"):
         efficiency = torques * speeds / np.where(fuel > 0, fuel, np.nan)
-    best = np.nanargmax(np.where(np.isfinite(efficiency), efficiency, -1.0), axis=1)
-    return np.interp(speed_radps, speeds[:, 0], torques[np.arange(len(speeds)), best])
+    efficiency = np.where(np.isfinite(efficiency), efficiency, -1.0)
+    best, known = np.argmax(efficiency, axis=1), (efficiency >= 0).any(axis=1)
+    known |= ~known.any()
+    return np.interp(speed_radps, speeds[known, 0], torques[np.arange(len(speeds)), best][known])
 
 
 def _piston_speed_mps(engine: Engine, speed_radps: Array) -> Array:

@@ -38,8 +38,13 @@ def interpolated(
         result += np.where(weight == 0, 0.0, weight * corner)
     if np.isnan(values).any():
         result = np.where(np.isnan(result), _on_triangle(*(c for c, _ in corners), x, y), result)
-    outside = (np.abs(x - 0.5) > 0.5 + _ROUNDING) | (np.abs(y - 0.5) > 0.5 + _ROUNDING)
-    return np.where(outside, np.nan, result)
+    return np.where(_beyond(x) | _beyond(y), np.nan, result)
+
+
+def along(axis: Array, values: Array, at: Array) -> Array:
+    """A quantity on an axis, linear between its points; NaN beyond its ends."""
+    i, share = _place(axis, np.asarray(at, dtype=float))
+    return np.where(_beyond(share), np.nan, values[i] * (1 - share) + values[i + 1] * share)
 
 
 def highest_known(
@@ -60,8 +65,7 @@ def highest_known(
     # Just inside, so that a torque computed back from this one does not land in an unknown cell.
     torque = torque - _ROUNDING * (grid_torque_nm[-1] - grid_torque_nm[0])
     torque = np.maximum(torque, grid_torque_nm[0])
-    outside = np.abs(x - 0.5) > 0.5 + _ROUNDING
-    return np.where(outside | ~both.any(axis=-1), np.nan, torque)
+    return np.where(_beyond(x) | ~both.any(axis=-1), np.nan, torque)
 
 
 def _last(where: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -76,6 +80,10 @@ def _place(axis: Array, at: Array) -> tuple[NDArray[np.int64], Array]:
     """The cell's number along an axis, and the share of it passed."""
     cell = np.clip(np.searchsorted(axis, at, "right") - 1, 0, len(axis) - 2)
     return cell, (at - axis[cell]) / (axis[cell + 1] - axis[cell])
+
+
+def _beyond(share: Array) -> NDArray[np.bool_]:
+    return np.abs(share - 0.5) > 0.5 + _ROUNDING
 
 
 def _on_triangle(low: Array, up: Array, right: Array, far: Array, x: Array, y: Array) -> Array:

@@ -33,7 +33,7 @@ def engine_map(car: Architecture) -> MapFigures:
         efficiency=_nested(efficiency, 5),
         nox_kgpj=_nested(nox, 14) if np.nanmax(nox) > 0 else None,
         limit_nm=_rounded(engine_model.full_load_torque_nm(engine, speed), 3),
-        least_nm=_rounded(engine_model.drag_torque_nm(engine, speed), 3),
+        least_nm=_nested(engine_model.drag_torque_nm(engine, speed)[None, :], 3)[0],
     )
 
 

@@ -38,7 +38,8 @@ class MapFigures(FileModel):
     """A component over (speed, torque); None where it cannot be used or the figure has no meaning.
 
     efficiency: of the engine, or of the machine in the direction of its power
-    nox_kgpj: NOx per work, of engines only; limit_nm: largest torque over speed; least_nm: lowest
+    nox_kgpj: NOx per work, of engines only; limit_nm: largest torque over speed; least_nm: lowest,
+    None beyond a measured engine map's speeds
     """
 
     name: str
@@ -47,7 +48,7 @@ class MapFigures(FileModel):
     efficiency: list[list[float | None]]
     nox_kgpj: list[list[float | None]] | None
     limit_nm: list[float]
-    least_nm: list[float]
+    least_nm: list[float | None]
 
 
 class CarFigures(FileModel):
