@@ -23,6 +23,7 @@ from hevopt.cycle import Cycle
 from hevopt.demand import Demand, demand_of
 from hevopt.driver import change_down
 from hevopt.errors import DataError, InfeasibleError
+from hevopt.frozen import frozen
 from hevopt.problem import Control, ControlTable, Problem, Reject, Signals, Trajectory
 from hevopt.rejects import bits, function_rejects, limit_rejects
 from hevopt.shortfall import shortfall_message
@@ -251,7 +252,9 @@ def _assemble(
     modes, switch_fuel_kg = _modes(architecture, branches)
     widths = [len(branch.labels) for branch in branches]
     flows = {
-        name: _joined([branch.flows[name] for branch in branches], widths, len(demand.time_s))
+        name: frozen(
+            name, _joined([branch.flows[name] for branch in branches], widths, len(demand.time_s))
+        )
         for name in branches[0].flows
     }
     controls = tuple(
@@ -262,9 +265,11 @@ def _assemble(
     return ControlTable(
         time_s=demand.time_s,
         step_s=demand.step_s,
-        fuel_kg=np.hstack([branch.fuel_kg for branch in branches]),
-        nox_kg=np.hstack([branch.nox_kg for branch in branches]),
-        battery_power_w=np.hstack([branch.battery_power_w for branch in branches]),
+        fuel_kg=frozen("fuel_kg", np.hstack([branch.fuel_kg for branch in branches])),
+        nox_kg=frozen("nox_kg", np.hstack([branch.nox_kg for branch in branches])),
+        battery_power_w=frozen(
+            "battery_power_w", np.hstack([branch.battery_power_w for branch in branches])
+        ),
         reject=_rejects(branches),
         mode=np.repeat(modes, widths),
         switch_fuel_kg=switch_fuel_kg,

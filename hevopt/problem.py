@@ -5,8 +5,9 @@ Axis order is (time, control). Power > 0 flows towards the wheels; battery power
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntFlag
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +15,10 @@ from numpy.typing import NDArray
 
 from hevopt.battery import Battery, energy_j, within_limits
 from hevopt.errors import DataError
+from hevopt.frozen import frozen
 
 Array = NDArray[np.float64]
+_MODES_MAX = 1000
 
 
 class Reject(IntFlag):
@@ -68,10 +71,16 @@ class Signals:
     gear: NDArray[np.int64]
     clutch_open: NDArray[np.bool_]
 
+    def __post_init__(self) -> None:
+        _freeze(self, {"gear": np.int64, "clutch_open": np.bool_}, "signals: ")
+
+    def __reduce__(self) -> tuple:
+        return type(self), tuple(getattr(self, part.name) for part in fields(self))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ControlTable:
-    """Every control at every step.
+    """Every control at every step. It copies what it is given, and nothing in it can be changed.
 
     time_s, step_s: (time,) start and length of the steps
     fuel_kg, nox_kg, battery_power_w: (time, control) per step; finite also where rejected
@@ -115,30 +124,33 @@ class ControlTable:
         one, and nothing costs to switch; with it, `switch_fuel_kg` is (mode, mode), by default 0.
         Raises DataError where shapes do not agree or usable entries are not finite.
         """
-        fuel, power = np.array(fuel_kg, dtype=float), np.array(battery_power_w, dtype=float)
-        if fuel.ndim != 2 or power.shape != fuel.shape:
+        fuel, power = frozen("fuel_kg", fuel_kg), frozen("battery_power_w", battery_power_w)
+        if fuel.ndim != 2 or power.shape != fuel.shape or not fuel.size:
             raise DataError(
-                f"fuel_kg and battery_power_w must be one shape (time, control); found {fuel.shape} "
-                f"and {power.shape}"
+                "fuel_kg and battery_power_w must be one shape (time, control), with a step and a control at "
+                f"least; found {fuel.shape} and {power.shape}"
             )
-        usable = np.ones(fuel.shape, bool) if feasible is None else np.array(feasible, dtype=bool)
-        nox = np.zeros_like(fuel) if nox_kg is None else np.array(nox_kg, dtype=float)
+        usable = frozen("feasible", np.ones(fuel.shape) if feasible is None else feasible, np.bool_)
+        nox = np.zeros_like(fuel) if nox_kg is None else frozen("nox_kg", nox_kg)
         if usable.shape != fuel.shape or nox.shape != fuel.shape:
             raise DataError(f"feasible and nox_kg must have the shape of fuel_kg, {fuel.shape}")
-        steps = np.broadcast_to(np.asarray(step_s, dtype=float), fuel.shape[:1]).copy()
-        modes = np.zeros(fuel.shape[1], np.int64) if mode is None else np.array(mode, np.int64)
-        count = int(modes.max()) + 1
-        switch = np.zeros((count, count)) if switch_fuel_kg is None else np.array(switch_fuel_kg)
-        allowed = (
-            np.ones(switch.shape, bool) if switch_allowed is None else np.array(switch_allowed)
-        )
+        steps = frozen("step_s", step_s)
+        if steps.shape not in ((), (1,), fuel.shape[:1]):
+            raise DataError(
+                f"step_s has shape {steps.shape}; allowed: one number, or one per step, {fuel.shape[:1]}"
+            )
+        steps = np.broadcast_to(steps, fuel.shape[:1])
+        modes = frozen("mode", np.zeros(fuel.shape[1]) if mode is None else mode, np.int64)
+        switch = _no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
+        switch = frozen("switch_fuel_kg", switch)
+        allowed = np.ones(switch.shape) if switch_allowed is None else switch_allowed
         return cls(
             time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
             step_s=steps,
             fuel_kg=np.where(usable, fuel, 0.0),
             nox_kg=np.where(usable, nox, 0.0),
             battery_power_w=np.where(usable, power, 0.0),
-            reject=np.where(usable, 0, int(Reject.GIVEN)).astype(np.uint16),
+            reject=np.where(usable, 0, int(Reject.GIVEN)),
             mode=modes,
             switch_fuel_kg=switch,
             switch_allowed=allowed,
@@ -146,35 +158,56 @@ class ControlTable:
         )
 
     def __post_init__(self) -> None:
+        types = {"reject": np.uint16, "mode": np.int64, "switch_allowed": np.bool_}
+        _freeze(self, types, "control table: ")
+        flows = {
+            name: frozen(f"control table: flows {name}", flow) for name, flow in self.flows.items()
+        }
+        object.__setattr__(self, "flows", MappingProxyType(flows))
+        object.__setattr__(self, "controls", tuple(self.controls))
         self._check_shapes()
         self._check_values()
-        for name in ("time_s", "step_s", "fuel_kg", "nox_kg", "battery_power_w", "reject", "mode"):
-            getattr(self, name).flags.writeable = False
+
+    def __reduce__(self) -> tuple:
+        """Copies and pickles are made by the constructor, so that they cannot be changed either."""
+        parts = {part.name: getattr(self, part.name) for part in fields(self)}
+        return type(self), tuple((parts | {"flows": dict(self.flows)}).values())
 
     def _check_shapes(self) -> None:
-        steps, controls = self.fuel_kg.shape
-        modes = len(self.switch_fuel_kg)
+        if self.fuel_kg.ndim != 2 or not self.fuel_kg.size:
+            raise DataError(
+                f"control table: fuel_kg has shape {self.fuel_kg.shape}, expected (time, control), with a step "
+                "and a control at least"
+            )
+        whole = steps, controls = self.fuel_kg.shape
+        modes = len(self.switch_fuel_kg) if self.switch_fuel_kg.ndim else 0
         expected = {
             "time_s": (steps,),
             "step_s": (steps,),
-            "nox_kg": (steps, controls),
-            "battery_power_w": (steps, controls),
-            "reject": (steps, controls),
+            "nox_kg": whole,
+            "battery_power_w": whole,
+            "reject": whole,
             "mode": (controls,),
             "switch_fuel_kg": (modes, modes),
             "switch_allowed": (modes, modes),
+            "missing_torque_nm": (steps,),
         }
-        for name, shape in expected.items():
-            if getattr(self, name).shape != shape:
+        found = {name: getattr(self, name) for name in expected}
+        found |= {f"flows {name}": values for name, values in self.flows.items()}
+        for part in fields(Signals) if self.signals is not None else ():
+            name = f"signals.{part.name}"
+            found[name], expected[name] = getattr(self.signals, part.name), (steps,)
+        for name, values in found.items():
+            if values is not None and values.shape != expected.get(name, whole):
                 raise DataError(
-                    f"control table: {name} has shape {getattr(self, name).shape}, expected {shape}"
+                    f"control table: {name} has shape {values.shape}, expected {expected.get(name, whole)}"
                     " (time, control) or (mode, mode)"
                 )
         if len(self.controls) != controls:
             raise DataError(f"control table: {len(self.controls)} labels for {controls} controls")
 
     def _check_values(self) -> None:
-        for name in ("time_s", "step_s", "fuel_kg", "nox_kg", "battery_power_w", "switch_fuel_kg"):
+        for name in ("step_s", "time_s", "fuel_kg", "nox_kg", "battery_power_w", "switch_fuel_kg"):
             if not np.isfinite(getattr(self, name)).all():
                 raise DataError(
                     f"control table: {name} holds NaN or infinite values; give any finite value "
@@ -194,6 +227,25 @@ class ControlTable:
     def feasible(self) -> NDArray[np.bool_]:
         """(time, control) True where the control can be used."""
         return self.reject == 0
+
+
+def _freeze(parts: Signals | ControlTable, types: Mapping[str, type], place: str) -> None:
+    """Put arrays that cannot be changed in the place of those given: of float64 but for the types named."""
+    for part in fields(parts):
+        if part.name in ("controls", "signals", "flows") or getattr(parts, part.name) is None:
+            continue
+        values = frozen(
+            place + part.name, getattr(parts, part.name), types.get(part.name, np.float64)
+        )
+        object.__setattr__(parts, part.name, values)
+
+
+def _no_switching(modes: NDArray[np.int64]) -> Array:
+    """(mode, mode) of 0 for every mode that stands in the list."""
+    highest = int(modes.max(initial=0))
+    if not 0 <= highest < _MODES_MAX:
+        raise DataError(f"mode runs to {highest}; allowed: 0 to {_MODES_MAX - 1}")
+    return np.zeros((highest + 1, highest + 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ window is an error, never clipped. The end charge is not judged here: a row that
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hevopt import battery as battery_model
 from hevopt._battery_kernels import trace
@@ -21,15 +21,14 @@ Array = NDArray[np.float64]
 _WINDOW_TOLERANCE = 1e-9
 
 
-def simulate(problem: Problem, control: NDArray[np.int64]) -> Trajectory:
+def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     """The trajectory of control indices, (time,).
 
-    Raises InfeasibleError at the first step whose control is rejected, whose switch is forbidden or whose
-    charge leaves the window.
+    Raises InfeasibleError at the first step whose control is no index or rejected, whose switch is forbidden or
+    whose charge leaves the window.
     """
     table = problem.table
-    control = np.array(control, dtype=np.int64)
-    _check_indices(table, control)
+    control = _indices(table, control)
     steps = np.arange(len(control))
     mode = table.mode[control]
     before = np.concatenate([[problem.start_mode], mode[:-1]])
@@ -73,16 +72,34 @@ def total_cost_kg(problem: Problem, control: NDArray[np.int64]) -> tuple[float, 
     return float(cost), trace(problem.start_j, power_w, table.step_s, problem.battery.arrays)
 
 
-def _check_indices(table: ControlTable, control: NDArray[np.int64]) -> None:
+def _indices(table: ControlTable, plan: ArrayLike) -> NDArray[np.int64]:
+    """A plan as usable indices, (time,); InfeasibleError for what is none."""
     steps, controls = table.reject.shape
-    if control.shape != (steps,):
-        raise InfeasibleError(f"a plan needs one control per step, {steps}; found {control.shape}")
-    if control.min() < 0 or control.max() >= controls:
+    allowed = f"allowed: whole numbers from 0 to {controls - 1}"
+    try:
+        given = np.asarray(plan)
+    except ValueError:
         raise InfeasibleError(
-            f"control indices run from {control.min()} to {control.max()}; allowed: 0 to "
-            f"{controls - 1}"
+            f"a plan of unequal rows; needed: one control per step, {steps}"
+        ) from None
+    if given.shape != (steps,):
+        raise InfeasibleError(f"a plan needs one control per step, {steps}; found {given.shape}")
+    if given.dtype.kind not in "iuf":
+        raise InfeasibleError(f"a plan holds indices of controls, not {given.dtype}; {allowed}")
+    # Written so that NaN is outside.
+    wrong = ~((given >= 0) & (given < controls) & (given == np.floor(given)))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InfeasibleError(
+            f"control {given[k]} at step {k} (t = {table.time_s[k]:g} s) is none; {allowed}"
         )
-    reject = table.reject[np.arange(steps), control]
+    control = given.astype(np.int64)
+    _check_usable(table, control)
+    return control
+
+
+def _check_usable(table: ControlTable, control: NDArray[np.int64]) -> None:
+    reject = table.reject[np.arange(len(control)), control]
     if reject.any():
         k = int(np.argmax(reject != 0))
         reasons = [word for bit, word in REJECT_WORDS.items() if reject[k] & bit]

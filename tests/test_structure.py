@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 # From the bottom up; a module may import from its own row or rows above it in this list, never below.
 LAYERS = [
     ["errors", "units", "_compile", "grid", "key_meanings"],
-    ["files"],
+    ["files", "frozen"],
     ["writing"],
     ["datafile", "cycle", "keypaths"],
     ["_battery_kernels", "file_fields"],
