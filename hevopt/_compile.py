@@ -1,20 +1,95 @@
-"""The one way hevopt compiles its loops: cached on disk where there is a place for that."""
+"""The one way hevopt compiles its loops: the same bits however one came about, kept on disk where there is a place.
 
+Arithmetic is that of IEEE 754, in the order written. Freedom to reorder sums or to fuse them with products would
+be used one way where a loop is compiled with what it calls, another where a part of it comes from the disk.
+
+What is kept is one file per loop and types, written whole under another name first, with a digest in front: a file
+that is spoilt, or older than any of the loops, is passed over and replaced by what is compiled afresh.
+"""
+
+import hashlib
+import pickle
+import shutil
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
+
+_DIGEST_BYTES = hashlib.sha256().digest_size
 
 
-def compiled(**options: Any) -> Callable[[Callable], Callable]:
-    """Decorator: numba.njit with a cache; without one where neither package nor home can be written."""
+def compiled(*, inline: str = "never") -> Callable[[Callable], Callable]:
+    """Decorator: numba.njit, kept on disk; without that where neither package nor home can be written."""
 
     def decorate(function: Callable) -> Callable:
-        try:
-            return numba.njit(cache=True, **options)(function)
-        except RuntimeError as error:
-            if "no locator available" not in str(error):
-                raise
-            return numba.njit(**options)(function)
+        loop = numba.njit(inline=inline)(function)
+        if isinstance(loop, Dispatcher):
+            try:
+                loop._cache = _Cache(function)
+            except RuntimeError as error:
+                if "no locator available" not in str(error):
+                    raise
+        return loop
 
     return decorate
+
+
+class _Cache(FunctionCache):
+    """numba's cache, to which no state of the disk is an error."""
+
+    def __init__(self, function: Callable) -> None:
+        super().__init__(function)
+        self._cache_file = _Files(
+            self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
+        )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        # Whatever a file of another making holds, the loop can be compiled.
+        with suppress(Exception):
+            return super().load_overload(sig, target_context)
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class _Files(IndexDataCacheFile):
+    """The compiled forms of one loop: without an index, two processes have nothing to disagree on."""
+
+    def load(self, key: Any) -> Any:
+        """What was compiled, None where it is not there, spoilt or stale."""
+        path = self._path(key)
+        kept = path.read_bytes() if path.is_file() else b""
+        digest, contents = kept[:_DIGEST_BYTES], kept[_DIGEST_BYTES:]
+        return pickle.loads(contents) if digest == self._digest(contents) else None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled in place of what is there."""
+        path, contents = self._path(key), self._dump(data)
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        with self._open_for_write(str(path)) as file:
+            file.write(self._digest(contents) + contents)
+
+    def _path(self, key: Any) -> Path:
+        types = hashlib.sha256(repr(key).encode()).hexdigest()
+        return Path(self._cache_path) / self._data_name(int(types[:15], 16))
+
+    def _digest(self, contents: bytes) -> bytes:
+        stamp = repr((self._version, self._source_stamp, _loops_digest())).encode()
+        return hashlib.sha256(stamp + contents).digest()
+
+
+@cache
+def _loops_digest() -> str:
+    """Of the text of all loops: a loop carries those it calls, of other files too, inside."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("_*kernels.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -47,17 +47,17 @@ def moves_by_cells(
     return offset
 
 
-@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled()
 def _lower_nodes(best, ahead, cost, share, rise):
     for j in range(len(best)):
-        weight = share + rise * j
+        weight = share + rise * np.int32(j)
         best[j] = min(best[j], cost + ahead[j] + weight * (ahead[j + 1] - ahead[j]))
 
 
-@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled()
 def _raise_defects(defect, best, ahead, cost, share, rise):
     for j in range(len(defect)):
-        weight = share + rise * j
+        weight = share + rise * np.int32(j)
         line = weight * best[j] + (1.0 - weight) * best[j + 1]
         defect[j] = max(defect[j], line - cost - ahead[j + 1])
 

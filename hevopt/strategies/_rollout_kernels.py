@@ -118,26 +118,26 @@ def rollout(first, cost, power, step_s, switch_kg, allowed, start_mode, start, v
     return path, k, furthest, moves
 
 
-@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled()
 def _relax(best, value, cost, low, high, cells, share, share_slope):
     """best[j] = min(best[j], cost + value at node j + cells + share_j) for low <= j < high."""
     ahead = value[low + cells : high + cells + 1]
     here = best[low:high]
     for j in range(high - low):
-        weight = share + share_slope * j
+        weight = share + share_slope * np.int32(j)
         candidate = cost + ahead[j] + weight * (ahead[j + 1] - ahead[j])
         here[j] = min(here[j], candidate)
 
 
-@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled()
 def _line(best, low, high, start, slope):
     """best[j] = min(best[j], start + slope (j - low)) for low <= j < high."""
     here = best[low:high]
     for j in range(high - low):
-        here[j] = min(here[j], start + slope * j)
+        here[j] = min(here[j], start + slope * np.int32(j))
 
 
-@compiled(fastmath={"nsz", "contract", "nnan", "ninf", "reassoc"})
+@compiled()
 def _lower(best, other, extra):
     """best[j] = min(best[j], other[j] + extra)."""
     for j in range(len(best)):
