@@ -13,7 +13,7 @@ from rich.text import Text
 from hevopt.files import printable
 from hevopt.problem import Plan, Problem
 from hevopt.published import published_beside
-from hevopt.rows import Row, end_asked_text, marked
+from hevopt.rows import Row, end_asked_text, marked, no_reference_text
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison
 from hevopt.writing import write_whole
@@ -117,7 +117,7 @@ def _reference(comparison: Comparison) -> str:
     for row in comparison.rows:
         if f"{row.architecture} {row.strategy}" == comparison.reference:
             return f"{comparison.reference}{marked(row.status)}"
-    return "nothing, every row failed"
+    return no_reference_text(comparison.rows)
 
 
 def _end_notes(comparison: Comparison) -> str:

@@ -1,6 +1,6 @@
 """Rows: the figures of one architecture and strategy, made of a case and a trajectory, and their reference."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 
 from hevopt.architecture import Architecture
@@ -50,6 +50,11 @@ class Row:
     certificate: str | None = None
     solve_s: float | None = None
 
+    @property
+    def solved(self) -> bool:
+        """Whether there are figures: the case did not fail."""
+        return self.fuel_l_per_100km is not None
+
     def as_dict(self) -> dict:
         """All fields by name, in order."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
@@ -91,14 +96,13 @@ def failed_row(car: Architecture, strategy: str, error: HevoptError) -> Row:
 
 
 def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
-    """Rows with their change against a solved row of architecture A, or else of the table: the first that is ok,
-    or else the first.
+    """Rows with their change against a solved row of architecture A, or of the whole table where A is not in it:
+    the first that is ok, or else the first. No change where there is none.
     """
-    good = [row for row in rows if row.fuel_l_per_100km is not None]
-    named = [row for row in good if row.architecture == REFERENCE_ARCHITECTURE]
-    if not good:
+    named = [row for row in rows if row.architecture == REFERENCE_ARCHITECTURE]
+    candidates = [row for row in named or rows if row.solved]
+    if not candidates:
         return rows, None
-    candidates = named or good
     base = next((row for row in candidates if row.status == "ok"), candidates[0])
 
     def change(value: float | None, reference: float | None) -> float | None:
@@ -117,6 +121,20 @@ def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
         for row in rows
     ]
     return changed, f"{base.architecture} {base.strategy}"
+
+
+def no_reference_text(rows: Iterable[Row]) -> str:
+    """Why no row is compared with another."""
+    solved = {row.architecture: False for row in rows}
+    solved |= {row.architecture: True for row in rows if row.solved}
+    if not any(solved.values()):
+        return "nothing, every row failed"
+    if solved.get(REFERENCE_ARCHITECTURE, True):
+        return "nothing, a single run"
+    return (
+        f"nothing, as no row of {REFERENCE_ARCHITECTURE} was solved (--allow-shortfall drives on where a step "
+        "cannot be followed)"
+    )
 
 
 def end_asked_text(end_asked: Mapping[str, float]) -> str:

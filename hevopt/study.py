@@ -33,6 +33,7 @@ _FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 class Comparison:
     """All rows of a cycle, and the messages of what failed, by architecture and strategy.
 
+    reference: the row that changes are against, None where there are none
     end_asked: car -> state of charge asked at the end, of those where it is another than the start's
     """
 
@@ -109,7 +110,7 @@ def compare(
             except _FAILURES as error:
                 failures[f"{car.name} {name}"] = error
                 rows.append(failed_row(car, name, error))
-    if all(row.fuel_l_per_100km is None for row in rows):
+    if not any(row.solved for row in rows):
         unknown = [error for error in failures.values() if isinstance(error, UnknownNoxError)]
         if unknown and len(unknown) == len(failures):
             raise unknown[0]

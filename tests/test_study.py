@@ -1,12 +1,15 @@
 """The study's claims: magnitudes, ranking, bounds and balances, for every architecture and shipped cycle."""
 
+import json
+
 import numpy as np
 import pytest
+from command_line import call
 from conftest import ARCHITECTURES, CYCLES, HYBRIDS
 
 from hevopt import load_architecture, load_cycle, simulate
 from hevopt.demand import demand_of
-from hevopt.rows import Row, against_reference
+from hevopt.rows import Row, against_reference, no_reference_text
 from hevopt.strategies import STRATEGIES, fitting
 
 
@@ -73,7 +76,7 @@ def test_on_the_nedc_every_row_is_neutral(comparison_of):
         ({"A first": "not neutral", "A second": "ok", "C2 third": "ok"}, "A second"),
         ({"A first": "shortfall at 2 steps", "C2 second": "ok"}, "A first"),
         ({"C2 first": "not neutral", "D second": "ok"}, "D second"),
-        ({"A first": "failed: no plan", "D second": "not neutral"}, "D second"),
+        ({"A first": "failed: no plan", "D second": "not neutral"}, None),
     ],
 )
 def test_the_reference_is_a_row_of_a_and_without_marks_where_there_is_one(statuses, expected):
@@ -83,11 +86,35 @@ def test_the_reference_is_a_row_of_a_and_without_marks_where_there_is_one(status
     ]
     changed, reference = against_reference(rows)
     assert reference == expected
-    assert [
-        row.delta_fuel_percent
-        for row in changed
-        if f"{row.architecture} {row.strategy}" == expected
-    ] == [0.0]
+    found = {f"{row.architecture} {row.strategy}": row.delta_fuel_percent for row in changed}
+    if expected is None:
+        assert set(found.values()) == {None}
+        assert no_reference_text(rows).startswith("nothing, as no row of A was solved")
+    else:
+        assert found[expected] == 0.0
+
+
+def test_a_car_other_than_a_is_no_reference_where_a_misses_a_step(monkeypatch, capsys):
+    """A is short of 18 Nm at one step of 600."""
+    words = ["compare", "--cycle", "us06", "--architectures", "A,C1", "--strategies", "baseline"]
+    status, out, err = call(monkeypatch, capsys, *words, "--json")
+    failed, solved = json.loads(out)["rows"]
+    assert status == 3 and failed["status"].startswith("failed: ") and "1 of 600 steps" in err
+    assert solved["status"] == "ok"
+    assert solved["delta_fuel_percent"] is None and solved["delta_nox_percent"] is None
+    status, out, _ = call(monkeypatch, capsys, *words)
+    assert status == 3 and "vs ref: against nothing, as no row of A was solved" in out
+    status, out, _ = call(monkeypatch, capsys, *words, "--allow-shortfall")
+    assert status == 0
+    assert "vs ref: against A baseline, itself marked shortfall at 1 step." in out
+
+
+def test_a_single_run_that_was_solved_has_no_reference_and_no_failure(monkeypatch, capsys):
+    for car in ("A", "C1"):
+        words = ("run", car, "--strategy", "baseline", "--cycle", "hwfet")
+        status, out, _ = call(monkeypatch, capsys, *words)
+        assert status == 0 and "vs ref: against nothing, a single run." in out
+        assert "failed" not in out
 
 
 @pytest.mark.parametrize("cycle", CYCLES)

@@ -160,7 +160,6 @@ def run(
         [row],
         {},
         nox_weight,
-        "nothing, a single run",
         end_asked=study.end_asked([car]),
     )
     if out is not None:
