@@ -23,6 +23,7 @@ OWN = (
     "--set",
     "fuel.density_kgpl=0.835",
 )
+FUEL = ("--set", "fuel={heating_value_mjpkg=42.9,density_kgpl=0.835,co2_kgpkg=3.16}")
 ENGINE = load_architecture("A").engine
 HEAT_JPKG = 42.9e6
 

@@ -64,7 +64,7 @@ def _doubts(axes: "Axes", imported: Imported, envelope: Envelope) -> None:
             where=lowest > envelope.low_nm, facecolor="none", edgecolor="#b00020", hatch="///", linewidth=0,
             label="assumed, not measured",
         )  # fmt: skip
-    gap = widest_gap(imported.lines)
+    gap = widest_gap(imported.lines, envelope)
     if gap is not None and gap.times > WIDE:
         turn = np.linspace(0, 2 * np.pi, 100)
         axes.plot(

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
-from hevopt.imports.map_grid import Axes, Grid, Lines, envelope_nm, on_axes, torque_axis
+from hevopt.imports.map_grid import Axes, Grid, on_axes, torque_axis
 from hevopt.imports.map_import import Request
 from hevopt.imports.map_limits import cell_at, encloses, near
-from hevopt.imports.map_points import Curve, EngineFacts, Points, read_curve
+from hevopt.imports.map_lines import Lines, envelope_nm
+from hevopt.imports.map_points import Curve, EngineFacts, Points, above_zero, read_curve
 from hevopt.units import RPM_PER_RADPS, TO_SI
 
 Array = NDArray[np.float64]
@@ -56,14 +57,15 @@ def motoring_curve(
             "and torque, or --like NAME to take the drag of another engine, scaled by displacement"
         )
     note = f"motoring curve: ASSUMED, drag mean pressure of {request.like} times the displacement"
-    torque = _drag_nm(like, lines.speed_radps) * displacement_cm3 / like.displacement_cm3
-    return Curve(lines.speed_radps, torque, note)
+    scale = displacement_cm3 / like.displacement_cm3
+    if like.fuel_map is not None:  # a curve of its own, which ends where it was measured
+        speed = np.array(like.fuel_map.speed_rpm) / RPM_PER_RADPS
+        return Curve(speed, np.array(like.fuel_map.motoring_torque_nm) * scale, note)
+    return Curve(lines.speed_radps, _drag_nm(like, lines.speed_radps) * scale, note)
 
 
 def _drag_nm(like: EngineFile, speed_radps: Array) -> Array:
     rpm = speed_radps * RPM_PER_RADPS
-    if like.fuel_map is not None:
-        return np.interp(rpm, like.fuel_map.speed_rpm, like.fuel_map.motoring_torque_nm)
     k, piston_mps = like.fuel_coefficients, 2 * like.stroke_mm / 1e3 * rpm / 60
     volume_m3 = like.displacement_cm3 * TO_SI["_cm3"][1]
     return (k.l + k.l2 * piston_mps**2) * _PA_PER_BAR * volume_m3 / (4 * pi)
@@ -92,7 +94,7 @@ def full_load(request: Request, lines: Lines, facts: EngineFacts) -> Curve:
         if curve is not None:
             return curve
     note = "full load: no curve given, so the highest torque measured at each speed"
-    return Curve(*envelope_nm(lines), note)
+    return above_zero(Curve(*envelope_nm(lines), note))
 
 
 def check_idle(idle_rpm: float, full: Curve) -> None:

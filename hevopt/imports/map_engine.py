@@ -10,7 +10,7 @@ from hevopt.datafile import checked
 from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.imports.map_curves import check_idle, flow_grid, full_load, motoring_curve, on_speeds
-from hevopt.imports.map_grid import Lines, axes_of, in_lines, is_idle
+from hevopt.imports.map_grid import axes_of
 from hevopt.imports.map_import import (
     Imported,
     Request,
@@ -20,6 +20,7 @@ from hevopt.imports.map_import import (
     with_given,
 )
 from hevopt.imports.map_limits import lowered
+from hevopt.imports.map_lines import Lines, in_lines, is_idle
 from hevopt.imports.map_points import Curve, EngineFacts, read_points
 from hevopt.units import RPM_PER_RADPS, TO_SI
 
@@ -63,6 +64,7 @@ def import_engine(request: Request) -> Imported:
         notes += _nox_notes(request, nox, notes)
         of_nox = flow_grid(nox, axes, motoring, full)[0], nox
         maps["nox_gps"] = (of_nox[0].values * 1e3).tolist()
+    notes += _inherited_fuel(request, base)
     check_used(request, used)
     limit = {"speed_rpm": rpm_list(full.speed_radps), "torque_nm": full.torque_nm.tolist()}
     contents = base | {"full_load": limit, "fuel_map": maps}
@@ -109,6 +111,23 @@ def _engine_base(
             "them from another engine, or --set KEY=VALUE for each"
         )
     return base, origins
+
+
+def _inherited_fuel(request: Request, base: Mapping[str, Any]) -> list[str]:
+    """A warning about what is another engine's fuel; it makes litres and CO2 of every result."""
+    keys = (
+        []
+        if "fuel" in request.given
+        else [k for k in _FUEL_KEYS if f"fuel.{k}" not in request.given]
+    )
+    if not keys or request.like is None:
+        return []
+    values = ", ".join(f"{key} {base['fuel'][key]:g}" for key in keys)
+    options = " ".join(f"--set fuel.{key}=VALUE" for key in keys)
+    return [
+        f"WARNING: the fuel is that of {request.like}: {values}; another fuel gives other litres, CO2 and "
+        f"efficiency (a petrol engine with diesel's density is 12 % off); if it burns another, give {options}"
+    ]
 
 
 def _dotted(keys: tuple[str, ...]) -> list[str]:

@@ -14,6 +14,7 @@ from hevopt.units import RPM_PER_RADPS
 Array = NDArray[np.float64]
 
 FINE = 200
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,11 +38,12 @@ def envelope_of(file: EngineFile | MachineFile, speed_radps: Array | None = None
     rpm = np.linspace(low_rpm, high_rpm, FINE)
     if speed_radps is not None:
         rpm = speed_radps * RPM_PER_RADPS
-        rpm = np.where((rpm < low_rpm) | (rpm > high_rpm), np.nan, rpm)
+        slack = _ROUNDING * high_rpm
+        rpm = np.where((rpm < low_rpm - slack) | (rpm > high_rpm + slack), np.nan, rpm)
     speed = rpm / RPM_PER_RADPS
     if engine:
         full, grid = file.full_load, file.fuel_map
-        low = np.interp(rpm, grid.speed_rpm, grid.motoring_torque_nm)
+        low = np.interp(rpm, grid.speed_rpm, grid.motoring_torque_nm)  # drawn on beyond the map
         return Envelope(speed, low, np.interp(rpm, full.speed_rpm, full.torque_nm))
     with np.errstate(divide="ignore"):
         high = np.minimum(file.torque_max_nm, file.power_max_w / speed)
@@ -64,6 +66,34 @@ def accepted(imported: Imported, speed_radps: Array, torque_nm: Array) -> NDArra
     for grid in (imported.grid, *(imported.nox or ())[:1]):
         inside &= ~np.isnan(grid.at(torque_nm, speed_radps))
     return inside
+
+
+def in_reach(
+    file: EngineFile | MachineFile, speed_radps: Array, torque_nm: Array
+) -> NDArray[np.bool_]:
+    """Where the component can be at all, whatever was measured: between idle and its highest speed, and within
+    its limits of torque."""
+    envelope = envelope_of(file, speed_radps)
+    slack = _ROUNDING * np.nanmax(np.abs(torque_nm), initial=0.0)
+    above = torque_nm >= envelope.low_nm - slack
+    return above & (torque_nm <= envelope.high_nm + slack)
+
+
+def corners(grid: Grid, file: EngineFile | MachineFile) -> tuple[Array, Array]:
+    """Speeds and torques, (place,), at which a map may be at its best: its cells in reach, and those of the limits.
+
+    The limits at the grid's speeds and at the corners of the full-load curve.
+    """
+    speed, torque = mesh(grid)
+    reached = in_reach(file, speed, torque)
+    at = grid.speed_radps
+    if file.full_load is not None:
+        at = np.union1d(at, np.array(file.full_load.speed_rpm) / RPM_PER_RADPS)
+    limits = envelope_of(file, at)
+    speeds = np.concatenate([speed[reached], at, at])
+    torques = np.concatenate([torque[reached], limits.high_nm, limits.low_nm])
+    known = np.isfinite(torques)
+    return speeds[known], torques[known]
 
 
 def mesh(grid: Grid) -> tuple[Array, Array]:

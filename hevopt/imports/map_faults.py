@@ -3,9 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.imports.map_envelope import Envelope, mesh, place
+from hevopt.engine_file import EngineFile
+from hevopt.imports.map_envelope import Envelope, in_reach, mesh, place
 from hevopt.imports.map_gaps import WIDE, fired, widest_gap
-from hevopt.imports.map_grid import Grid, Lines
+from hevopt.imports.map_grid import Grid
+from hevopt.imports.map_import import Imported
+from hevopt.imports.map_lines import Lines
+from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -17,8 +21,9 @@ _SMALL = 0.01
 _OFF = 0.02
 
 
-def faults(grid: Grid, lines: Lines, envelope: Envelope, what: str) -> list[str]:
-    """Lines of text about the map of "fuel" or "loss"."""
+def faults(imported: Imported, envelope: Envelope, what: str) -> list[str]:
+    """Lines of text about the map of "fuel" or "loss", as far as the component gets."""
+    grid, lines = imported.grid, imported.lines
     speed, torque = mesh(grid)
     axis = grid.speed_radps
     low, high = (
@@ -31,10 +36,14 @@ def faults(grid: Grid, lines: Lines, envelope: Envelope, what: str) -> list[str]
     if what == "fuel":
         with np.errstate(invalid="ignore"):
             falls = np.diff(grid.values, axis=1) < -_ROUNDING * np.nanmax(grid.values)
-        falls &= grid.torque_nm[1:] > 0
+        falls &= (grid.torque_nm[1:] > 0) & (torque[:, :-1] < high) & used[:, None]
         falling = _listed(falls, speed[:, 1:], torque[:, 1:], np.zeros(falls.shape))
         said.append(f"fuel falling as torque rises at one speed: {falling}")
-    return [*said, at_points(grid, lines, what), *_widest_gap(grid, lines)]
+    return [
+        *said,
+        at_points(grid, lines, imported.file, what),
+        *_widest_gap(grid, lines, envelope),
+    ]
 
 
 def _enclosed(grid: Grid) -> Array:
@@ -55,9 +64,12 @@ def _listed(where: NDArray[np.bool_], speed: Array, torque: Array, weight: Array
     return f"{len(places)}: {'; '.join(places[:_LISTED])}{more}" if places else "none"
 
 
-def at_points(grid: Grid, lines: Lines, what: str) -> str:
+def at_points(grid: Grid, lines: Lines, file: EngineFile | MachineFile, what: str) -> str:
     """How far the grid is from the points behind it; at the drag, where fuel is cut, it is 0 by rule."""
     points, burning = lines.points, fired(lines)
+    reached = in_reach(file, points.speed_radps, points.torque_nm)
+    beyond = int((burning & ~reached).sum())
+    burning &= reached
     value, there = points.value, grid.at(points.torque_nm, points.speed_radps)
     known = ~np.isnan(there) & burning
     if not known.any():
@@ -73,15 +85,16 @@ def at_points(grid: Grid, lines: Lines, what: str) -> str:
     ) * (many > 0)
     edge = int((burning & ~known).sum())
     outside = f"; {edge} lie at the edge, outside full cells" * (edge > 0)
+    outside += f"; {beyond} more lie where it cannot get" * (beyond > 0)
     return (
         f"grid against {known.sum()} measured points: {what} differs by {relative[k]:.2%} at most, at {where}, and "
         f"by {off.max() / top:.2%} of the largest value{outside}{warning}"
     )
 
 
-def _widest_gap(grid: Grid, lines: Lines) -> list[str]:
+def _widest_gap(grid: Grid, lines: Lines, envelope: Envelope) -> list[str]:
     """Where the map leans on points that are furthest away, between the lowest and highest measured torque."""
-    gap = widest_gap(lines)
+    gap = widest_gap(lines, envelope)
     if gap is None:
         return []
     said = (

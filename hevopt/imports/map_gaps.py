@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.imports.map_grid import Lines, envelope_nm
+from hevopt.imports.map_envelope import Envelope
+from hevopt.imports.map_lines import Lines, envelope_nm
 
 Array = NDArray[np.float64]
 
@@ -43,14 +44,21 @@ def lowest_fired_nm(lines: Lines, speed_radps: Array) -> Array:
     return np.interp(speed_radps, speed[known], lowest[known])
 
 
-def widest_gap(lines: Lines) -> Gap | None:
-    """The widest gap between the lowest and the highest torque measured; None without any distance."""
+def widest_gap(lines: Lines, envelope: Envelope) -> Gap | None:
+    """The widest gap between the lowest and the highest torque measured, as far as the component gets.
+
+    None without any distance.
+    """
     from scipy.spatial import cKDTree
 
     points = lines.points
-    axis = np.linspace(lines.speed_radps[0], lines.speed_radps[-1], _FINE)
-    low = lowest_fired_nm(lines, axis)
-    high = np.interp(axis, *envelope_nm(lines))
+    ends = np.clip(lines.speed_radps[[0, -1]], *envelope.speed_radps[[0, -1]])
+    axis = np.linspace(*ends, _FINE)
+    least, most = (
+        np.interp(axis, envelope.speed_radps, t) for t in (envelope.low_nm, envelope.high_nm)
+    )
+    low = np.clip(lowest_fired_nm(lines, axis), least, most)
+    high = np.clip(np.interp(axis, *envelope_nm(lines)), low, most)
     shares = np.linspace(0.0, 1.0, _FINE)
     torque = low[:, None] * (1 - shares) + high[:, None] * shares
     places = np.column_stack([np.repeat(axis, _FINE), torque.ravel()])

@@ -11,7 +11,8 @@ from hevopt.datafile import Model, read_toml
 from hevopt.engine_file import EngineFile
 from hevopt.errors import DataError
 from hevopt.files import find, shown
-from hevopt.imports.map_grid import Grid, Lines
+from hevopt.imports.map_grid import Grid
+from hevopt.imports.map_lines import Lines
 from hevopt.imports.map_tables import Source
 from hevopt.keypaths import with_changes
 from hevopt.machine_file import MachineFile

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.imports.map_grid import Lines, envelope_nm
+from hevopt.imports.map_lines import Lines, envelope_nm
 from hevopt.imports.map_points import Curve
 from hevopt.units import RPM_PER_RADPS
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hevopt.datafile import checked
 from hevopt.errors import DataError
-from hevopt.imports.map_grid import Grid, axes_of, in_lines, on_axes
+from hevopt.imports.map_grid import Grid, axes_of, on_axes
 from hevopt.imports.map_import import (
     Imported,
     Request,
@@ -16,6 +16,7 @@ from hevopt.imports.map_import import (
     with_given,
 )
 from hevopt.imports.map_limits import cell_at, near
+from hevopt.imports.map_lines import in_lines
 from hevopt.imports.map_points import Curve, EngineFacts, Points, read_curve, read_points
 from hevopt.imports.map_rest import with_no_load, with_rest
 from hevopt.imports.measured_rows import runs
@@ -98,10 +99,6 @@ def import_machine(request: Request) -> Imported:
 
 def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
     """The grid without cells beyond a limit of torque over speed, but with the corners of those it cuts."""
-    if (limit.torque_nm <= 0).any():
-        raise DataError(
-            f"full-load curve: torque {limit.torque_nm.min():g} Nm; every torque must be above 0"
-        )
     speed, torque = grid.speed_radps, grid.torque_nm
     values, known = grid.values.copy(), np.isfinite(grid.values)
     for i, row in enumerate(values):

@@ -4,7 +4,7 @@ Fuel and NOx become mass flows: specific consumption and efficiency say nothing 
 is nearly linear in torque. What a row cannot say is left out, and listed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -112,7 +112,36 @@ def read_curve(source: Source, role: str, facts: EngineFacts, *, plain: bool) ->
             f"{speed[~same][0] * RPM_PER_RADPS:g} rpm; a curve has one torque at each speed"
         )
     note = f"{role} curve from {measured.path.name}: {'; '.join(notes)}"
-    return Curve(speed, torque[first], note, frozenset(table.kinds))
+    curve = Curve(speed, torque[first], note, frozenset(table.kinds))
+    return above_zero(curve) if role == "full" else curve
+
+
+def above_zero(full: Curve) -> Curve:
+    """A full-load curve from its first to its last torque above 0, which its note says."""
+    driving = np.flatnonzero(full.torque_nm > 0)
+    if len(driving) < 2:
+        raise DataError(
+            f"{full.note}: {len(driving)} speeds with a torque above 0; a full-load curve needs 2 or more"
+        )
+    kept = slice(driving[0], driving[-1] + 1)
+    between = full.torque_nm[kept] <= 0
+    if between.any():
+        k = driving[0] + int(np.argmax(between))
+        raise DataError(
+            f"{full.note}: full-load torque {full.torque_nm[k]:.4g} Nm at "
+            f"{full.speed_radps[k] * RPM_PER_RADPS:.4g} rpm, between speeds where it is above 0; correct it"
+        )
+    note = full.note
+    for word, end, beyond in (("first", kept.start, -1), ("last", kept.stop - 1, 1)):
+        if 0 <= (k := end + beyond) < len(full.torque_nm):
+            rpm = full.speed_radps[[end, k]] * RPM_PER_RADPS
+            note += (
+                f"; {full.torque_nm[k]:.4g} Nm at {rpm[1]:.5g} rpm: READ TO ITS {word.upper()} POINT ABOVE 0, at "
+                f"{rpm[0]:.5g} rpm, and not used beyond"
+            )
+    return replace(
+        full, speed_radps=full.speed_radps[kept], torque_nm=full.torque_nm[kept], note=note
+    )
 
 
 def _drag(table: Table, torque_nm: Array) -> tuple[Array, tuple[str, ...]]:

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.engine_file import EngineFile
-from hevopt.imports.map_envelope import FINE, Envelope, between, envelope_of, mesh, place
+from hevopt.imports.map_envelope import FINE, Envelope, between, corners, envelope_of, place
 from hevopt.imports.map_faults import at_points, faults
 from hevopt.imports.map_gaps import lowest_fired_nm
-from hevopt.imports.map_grid import Grid, Lines
+from hevopt.imports.map_grid import Grid
 from hevopt.imports.map_import import Imported
+from hevopt.imports.map_lines import Lines
 from hevopt.machine_file import MachineFile
 from hevopt.units import RPM_PER_RADPS
 
@@ -31,13 +32,14 @@ def _engine(imported: Imported, file: EngineFile) -> list[str]:
     grid, envelope = imported.grid, envelope_of(file)
     heat = file.fuel.heating_value_mjpkg * 1e6
     said = [_extent(grid), *_engine_share(grid, imported.lines, envelope)]
-    speed, torque = mesh(grid)
+    speed, torque = corners(grid, file)
+    flow = grid.at(torque, speed)
     with np.errstate(invalid="ignore", divide="ignore"):
-        efficiency = np.where(torque > 0, torque * speed / (grid.values * heat), np.nan)
+        efficiency = np.where(torque > 0, torque * speed / (flow * heat), np.nan)
     efficiency[~np.isfinite(efficiency)] = np.nan
     if np.isfinite(efficiency).any():
-        k = np.unravel_index(np.nanargmax(efficiency), efficiency.shape)
-        best, value = efficiency[k], grid.values[k]
+        k = np.nanargmax(efficiency)
+        best, value = efficiency[k], flow[k]
         specific = value * 3.6e9 / (torque[k] * speed[k])
         said.append(
             f"peak efficiency: {best:.1%} ({specific:.1f} g/kWh) at {place(speed[k], torque[k])}"
@@ -48,28 +50,26 @@ def _engine(imported: Imported, file: EngineFile) -> list[str]:
             said.append(f"  WARNING: {than}; check units and heating value")
     said.append(_idle(grid, imported.lines, file))
     said += _above_full_load(imported.lines, file)
-    said += faults(grid, imported.lines, envelope, "fuel")
+    said += faults(imported, envelope, "fuel")
     return said if imported.nox is None else said + _nox(imported, file, envelope)
 
 
 def _machine(imported: Imported, file: MachineFile) -> list[str]:
     grid, envelope = imported.grid, envelope_of(file)
     said = [_extent(grid), _share(grid, envelope, "within torque and power limit")]
-    speed, torque = mesh(grid)
-    power = np.abs(torque * speed)
+    speed, torque = corners(grid, file)
+    power, loss = np.abs(torque * speed), grid.at(torque, speed)
     for name, sign in (("motoring", 1), ("generating", -1)):
         one_way = np.where((sign * torque > 0) & (speed > 0), power, np.nan)
         with np.errstate(invalid="ignore"):
-            efficiency = (
-                one_way / (one_way + grid.values) if sign > 0 else 1 - grid.values / one_way
-            )
+            efficiency = one_way / (one_way + loss) if sign > 0 else 1 - loss / one_way
         if np.isfinite(efficiency).any():
-            k = np.unravel_index(np.nanargmax(efficiency), efficiency.shape)
+            k = np.nanargmax(efficiency)
             where = place(speed[k], torque[k])
             said.append(f"peak efficiency {name}: {efficiency[k]:.1%} at {where}")
-    top = float(np.nanmax(grid.values[:, np.flatnonzero(grid.torque_nm == 0)[0]]))
+    top = float(np.nanmax(loss[torque == 0]))
     said.append(f"loss without torque: up to {top:.0f} W")
-    return said + faults(grid, imported.lines, envelope, "loss")
+    return said + faults(imported, envelope, "loss")
 
 
 def _extent(grid: Grid) -> str:
@@ -155,7 +155,7 @@ def _nox(imported: Imported, file: EngineFile, envelope: Envelope) -> list[str]:
             "the import to use all of the fuel map"
         )
     said.append(_idle_nox(grid, lines, file))
-    return [*said, at_points(grid, lines, "NOx")]
+    return [*said, at_points(grid, lines, file, "NOx")]
 
 
 def _slack_nm(lines: Lines) -> float:

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.imports.map_grid import Grid, Lines, groups
+from hevopt.imports.map_grid import Grid
+from hevopt.imports.map_lines import Lines, groups
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]

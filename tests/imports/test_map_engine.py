@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from map_bench import ENGINE, LIKE, RPM, SPEEDS, bench, car_with, component, write
+from map_bench import ENGINE, FUEL, LIKE, RPM, SPEEDS, bench, car_with, component, write
 from numpy.testing import assert_allclose
 
 from hevopt import engine as engine_model
@@ -145,7 +145,7 @@ def test_points_of_the_dragged_engine_are_no_doubt_about_the_map(hevopt):
     rpm, torque, fuel, _ = bench().T
     columns = ([*rpm, *SPEEDS], [*torque, *DRAG], [*fuel, *np.zeros(len(SPEEDS))])
     write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *columns)
-    seen = hevopt(*IMPORT)
+    seen = hevopt(*IMPORT, *FUEL)
     assert "motoring curve: highest torque without fuel at each speed" in seen.out
     assert "WARNING" not in seen.out, seen.out
 

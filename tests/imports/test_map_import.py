@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from map_bench import (
     ENGINE,
+    FUEL,
     HEAT_JPKG,
     LIKE,
     OWN,
@@ -520,7 +521,7 @@ def test_what_lies_below_the_lowest_measured_torque_is_assumed_and_no_coverage(h
 
 def test_a_hole_between_points_is_a_wide_gap(hevopt):
     rpm, torque, fuel, _ = bench().T
-    arguments = ("maps", "import", "b.csv", "--kind", "engine", *LIKE)
+    arguments = ("maps", "import", "b.csv", "--kind", "engine", *LIKE, *FUEL)
     write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm, torque, fuel)
     assert "WARNING" not in hevopt(*arguments).out
     kept = ~((rpm > 1400) & (rpm < 3100) & (torque > 50) & (torque < 190))
