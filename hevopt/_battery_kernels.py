@@ -1,4 +1,4 @@
-"""Compiled battery step: the one step that simulation, dynamic programming and bounds share."""
+"""Compiled battery step: the one step that simulation, dynamic programming, rules and bounds share."""
 
 from typing import NamedTuple
 
@@ -6,6 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._compile import compiled
+
+# Share of Uoc² by which rounding may carry a power beyond U²/4R, the most the voltage can deliver.
+_BEYOND_PEAK = 1e-9
+# Least share of Uoc that the root counts in a slope: at U²/4R the slope has no end.
+_LEAST_ROOT = 1e-6
 
 
 class BatteryArrays(NamedTuple):
@@ -21,16 +26,20 @@ class BatteryArrays(NamedTuple):
 
 
 @compiled(inline="always")
-def state_at(energy, battery):
-    """SOC, open-circuit voltage, discharge and charge resistance at a stored energy."""
+def _segment_at(energy, battery):
     i = 0
     while i < len(battery.energy_j) - 2 and energy >= battery.energy_j[i + 1]:
         i += 1
+    return i
+
+
+@compiled(inline="always")
+def _state_in(i, energy, battery):
     low_v = battery.open_circuit_v[i]
     width = battery.soc[i + 1] - battery.soc[i]
     slope = (battery.open_circuit_v[i + 1] - low_v) / width
     charge = (energy - battery.energy_j[i]) / battery.capacity_as
-    voltage = np.sqrt(max(low_v * low_v + 2.0 * slope * charge, 1e-12))
+    voltage = np.sqrt(max(low_v * low_v + 2.0 * slope * charge, 1e-12 * low_v * low_v))
     soc = battery.soc[i] + 2.0 * charge / (low_v + voltage)
     share = (soc - battery.soc[i]) / width
     discharge = battery.discharge_ohm[i] * (1.0 - share) + battery.discharge_ohm[i + 1] * share
@@ -39,13 +48,25 @@ def state_at(energy, battery):
 
 
 @compiled(inline="always")
+def state_at(energy, battery):
+    """SOC, open-circuit voltage, discharge and charge resistance at a stored energy."""
+    return _state_in(_segment_at(energy, battery), energy, battery)
+
+
+@compiled(inline="always")
+def source_power(power, voltage, resistance):
+    """Uoc I, and the root sqrt(Uoc² - 4 R P) = Uoc - 2 R I; NaN beyond what the voltage can deliver."""
+    squared = voltage * voltage - 4.0 * resistance * power
+    if squared < -_BEYOND_PEAK * voltage * voltage:
+        return np.nan, np.nan
+    root = np.sqrt(max(squared, 0.0))
+    return voltage * 2.0 * power / (voltage + root), root
+
+
+@compiled(inline="always")
 def chemical_power(power, voltage, discharge, charging, efficiency):
     """Rate at which stored energy falls; NaN beyond what the voltage can deliver."""
-    resistance = charging if power < 0.0 else discharge
-    root = voltage * voltage - 4.0 * resistance * power
-    if root < 0.0:
-        return np.nan
-    chemical = voltage * 2.0 * power / (voltage + np.sqrt(root))
+    chemical, _ = source_power(power, voltage, charging if power < 0.0 else discharge)
     return efficiency * chemical if power < 0.0 else chemical
 
 
@@ -57,6 +78,29 @@ def chemical_power_at(power, energy, battery):
 
 
 @compiled()
+def drain_and_slope(power, energy, battery):
+    """Rate at which stored energy falls, and its derivative by stored energy within the segment.
+
+    At constant P the current I obeys  dI/dU = -I / root,  dI/dR = I² / root,  so that of U I
+    d(U I)/dU = -2 R I² / root  and  d(U I)/dR = U I² / root;  SOC rises by 1 / (Q U) per joule.
+    """
+    i = _segment_at(energy, battery)
+    _, voltage, discharge, charging = _state_in(i, energy, battery)
+    resistance, ohms, efficiency = discharge, battery.discharge_ohm, 1.0
+    if power < 0.0:
+        resistance, ohms = charging, battery.charge_ohm
+        efficiency = battery.coulombic_efficiency
+    chemical, root = source_power(power, voltage, resistance)
+    width = battery.soc[i + 1] - battery.soc[i]
+    volt_slope = (battery.open_circuit_v[i + 1] - battery.open_circuit_v[i]) / width
+    ohm_slope = (ohms[i + 1] - ohms[i]) / width
+    current = chemical / voltage
+    change = current * current * (voltage * ohm_slope - 2.0 * resistance * volt_slope)
+    per_joule = max(root, _LEAST_ROOT * voltage) * battery.capacity_as * voltage
+    return efficiency * chemical, efficiency * change / per_joule
+
+
+@compiled()
 def trace(start_j, power_w, step_s, battery):
     """Stored energy after every step, (time + 1,), by the step all parts of hevopt share."""
     energy = np.empty(len(power_w) + 1)
@@ -64,3 +108,42 @@ def trace(start_j, power_w, step_s, battery):
     for k in range(len(power_w)):
         energy[k + 1] = energy[k] - step_s[k] * chemical_power_at(power_w[k], energy[k], battery)
     return energy
+
+
+@compiled()
+def states(energy, battery):
+    """(4, n) SOC, open-circuit voltage, discharge and charge resistance at many stored energies."""
+    result = np.empty((4, len(energy)))
+    for n in range(len(energy)):
+        soc, voltage, discharge, charging = state_at(energy[n], battery)
+        result[0, n], result[1, n], result[2, n], result[3, n] = soc, voltage, discharge, charging
+    return result
+
+
+@compiled()
+def source_powers(power, voltage, resistance):
+    """(n,) Uoc I of many powers, each at its own voltage and resistance."""
+    result = np.empty(len(power))
+    for n in range(len(power)):
+        result[n], _ = source_power(power[n], voltage[n], resistance[n])
+    return result
+
+
+@compiled()
+def amplification(power, battery):
+    """(n,) how much rounding of Uoc² can grow in the root, U / sqrt(U² - 4 R P), at most 1 / sqrt(epsilon).
+
+    Of each segment between two points the lowest voltage and the highest resistance.
+    """
+    most = 1.0 / np.sqrt(np.finfo(np.float64).eps)
+    result = np.ones(len(power))
+    for n in range(len(power)):
+        if power[n] <= 0.0:
+            continue
+        for i in range(len(battery.soc) - 1):
+            voltage = battery.open_circuit_v[i]
+            resistance = max(battery.discharge_ohm[i], battery.discharge_ohm[i + 1])
+            squared = voltage * voltage - 4.0 * resistance * power[n]
+            grown = most if squared <= 0.0 else min(voltage / np.sqrt(squared), most)
+            result[n] = max(result[n], grown)
+    return result

@@ -2,14 +2,16 @@
 
 import numpy as np
 
-from hevopt._battery_kernels import chemical_power
+from hevopt._battery_kernels import chemical_power, drain_and_slope
 from hevopt._compile import compiled
-from hevopt._step_prices_kernels import drain_and_slope
 
 
 @compiled()
-def moves_by_tangents(first, power, step_s, grid_low, cell, breaks, battery):
-    """(entry, piece) offset and rise of tangents above the move, in cells over nodes; move concave in energy."""
+def moves_by_tangents(first, power, step_s, steep, grid_low, cell, breaks, low, high, battery):
+    """(entry, piece) offset and rise of tangents above the move, in cells over nodes; move concave in energy.
+
+    Tangents touch within the window [low, high]. steep: (entry,) where the move counts as it is at `high`.
+    """
     pieces = len(breaks) - 1
     offset = np.empty((len(power), pieces))
     rise = np.empty((len(power), pieces))
@@ -17,10 +19,11 @@ def moves_by_tangents(first, power, step_s, grid_low, cell, breaks, battery):
         scale = step_s[k] / cell
         for i in range(first[k, 0], first[k, -1]):
             for b in range(pieces):
-                node = 0.5 * (breaks[b] + breaks[b + 1])
-                drain, slope = drain_and_slope(power[i], grid_low + cell * node, battery)
-                rise[i, b] = -scale * slope * cell
-                offset[i, b] = -scale * drain - rise[i, b] * node
+                middle = grid_low + cell * 0.5 * (breaks[b] + breaks[b + 1])
+                at = high if steep[i] else min(max(middle, low), high)
+                drain, slope = drain_and_slope(power[i], at, battery)
+                rise[i, b] = 0.0 if steep[i] else -step_s[k] * slope
+                offset[i, b] = -scale * drain - rise[i, b] * ((at - grid_low) / cell)
     return offset, rise
 
 
@@ -67,7 +70,10 @@ def _run_end(low, high, start, rise, whole):
     """First cell at or after `low` whose move start + rise (cell - low) has left `whole`, at most `high`."""
     if rise <= 0.0:
         return high
-    return min(high, max(low + int(np.ceil((whole + 1 - start) / rise)), low + 1))
+    end = min(high, max(low + int(np.ceil((whole + 1 - start) / rise)), low + 1))
+    while end > low + 1 and start + rise * (end - 1 - low) > whole + 1:
+        end -= 1
+    return end
 
 
 @compiled()

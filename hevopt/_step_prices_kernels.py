@@ -2,27 +2,11 @@
 
 import numpy as np
 
-from hevopt._battery_kernels import chemical_power, state_at
+from hevopt._battery_kernels import chemical_power, chemical_power_at, drain_and_slope
 from hevopt._compile import compiled
 
-
-@compiled()
-def drain_and_slope(power, energy, battery):
-    """Rate at which stored energy falls and its derivative by stored energy, resistance held constant."""
-    i = 0
-    while i < len(battery.energy_j) - 2 and energy >= battery.energy_j[i + 1]:
-        i += 1
-    width = battery.soc[i + 1] - battery.soc[i]
-    volt_slope = (battery.open_circuit_v[i + 1] - battery.open_circuit_v[i]) / width
-    _, voltage, discharge, charging = state_at(energy, battery)
-    resistance = charging if power < 0.0 else discharge
-    drain = chemical_power(power, voltage, discharge, charging, battery.coulombic_efficiency)
-    root = np.sqrt(voltage * voltage - 4.0 * resistance * power)
-    current = 2.0 * power / (voltage + root)
-    by_voltage = -2.0 * resistance * current * current / root
-    if power < 0.0:
-        by_voltage *= battery.coulombic_efficiency
-    return drain, by_voltage * volt_slope / (battery.capacity_as * voltage)
+# A step's price is at most this multiple of the next one's; any prices are valid.
+_GROWTH_MAX = 10.0
 
 
 @compiled()
@@ -32,28 +16,35 @@ def costate(energy, power, step_s, battery):
     price = np.ones(steps)
     for k in range(steps - 1, 0, -1):
         _, slope = drain_and_slope(power[k], energy[k], battery)
-        price[k - 1] = price[k] * max(1.0 - step_s[k] * slope, 0.0)
+        price[k - 1] = price[k] * min(max(1.0 - step_s[k] * slope, 0.0), _GROWTH_MAX)
     return price
 
 
 @compiled()
-def _worth_with_first_step(first, power, step_s, price, rollout, battery):
+def _worth_with_first_step(first, power, step_s, price, start, battery):
     """(entry,) with the first step's entries filled: there x is the start's, and has no price of its own."""
     worth = np.empty(len(power))
     for i in range(first[0, 0], first[0, -1]):
-        worth[i] = price[0] * step_s[0] * drain_and_slope(power[i], rollout[0], battery)[0]
+        worth[i] = price[0] * step_s[0] * chemical_power_at(power[i], start, battery)
     return worth
 
 
 @compiled()
-def worth_by_tangents(first, power, step_s, price, rollout, low, high, battery):
-    """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex in x."""
-    worth = _worth_with_first_step(first, power, step_s, price, rollout, battery)
+def worth_by_tangents(first, power, step_s, price, start, rollout, steep, low, high, battery):
+    """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex and falling in x.
+
+    steep: (entry,) whether r is too steep somewhere for a tangent; then r is at least its value at `high`
+    """
+    worth = _worth_with_first_step(first, power, step_s, price, start, battery)
     for k in range(1, len(step_s)):
         after = price[k]
+        tilt = price[k - 1] - after
+        middle = min(max(rollout[k], low), high)
         for i in range(first[k, 0], first[k, -1]):
-            tilt = price[k - 1] - after
-            middle = min(max(rollout[k], low), high)
+            if steep[i]:
+                drain = chemical_power_at(power[i], high, battery)
+                worth[i] = after * step_s[k] * drain + min(tilt * low, tilt * high)
+                continue
             best = -np.inf
             left_x, left_y, left_s = 0.0, 0.0, 0.0
             for n in range(3):
@@ -73,25 +64,25 @@ def worth_by_tangents(first, power, step_s, price, rollout, low, high, battery):
 
 @compiled()
 def _meeting(x1, y1, s1, x2, y2, s2):
-    """Height at which a falling tangent at x1 meets a rising one at x2."""
+    """Height at which a falling tangent at x1 meets a rising one at x2, never above it."""
     if s2 - s1 <= 0.0:
         return min(y1, y2)
     x = (y2 - s2 * x2 - y1 + s1 * x1) / (s1 - s2)
     x = min(max(x, x1), x2)
-    return max(y1 + s1 * (x - x1), y2 + s2 * (x - x2))
+    return min(y1 + s1 * (x - x1), y2 + s2 * (x - x2))
 
 
 @compiled()
 def worth_by_cells(
-    first, power, step_s, price, rollout, edges, voltage, discharge, charging, battery
+    first, power, step_s, price, start, edges, voltage, discharge, charging, battery
 ):
     """As worth_by_tangents, for any curves: the least over cells, r from below within each."""
-    worth = _worth_with_first_step(first, power, step_s, price, rollout, battery)
+    worth = _worth_with_first_step(first, power, step_s, price, start, battery)
     efficiency = battery.coulombic_efficiency
     for k in range(1, len(step_s)):
         after = price[k]
+        tilt = price[k - 1] - after
         for i in range(first[k, 0], first[k, -1]):
-            tilt = price[k - 1] - after
             best = np.inf
             for c in range(len(voltage)):
                 drain = chemical_power(power[i], voltage[c], discharge[c], charging[c], efficiency)
@@ -112,7 +103,7 @@ def linear_steps(first, power, step_s, energy, rollout_power, battery):
         _, slope = drain_and_slope(rollout_power[k], energy[k], battery)
         keep[k] = 1.0 - step_s[k] * slope
         for i in range(first[k, 0], first[k, -1]):
-            drain[i] = step_s[k] * drain_and_slope(power[i], energy[k], battery)[0]
+            drain[i] = step_s[k] * chemical_power_at(power[i], energy[k], battery)
     return drain, keep
 
 

@@ -12,10 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt import _battery_kernels as kernels
 from hevopt._battery_kernels import BatteryArrays
 from hevopt.errors import DataError
 
 Array = NDArray[np.float64]
+# What simulate lets a plan leave the window by: shares of the window, or of all stored energy if that is more.
+_WINDOW_TOLERANCE, _ENERGY_ROUNDING = 1e-9, 4e-12
+# Rounding of a power given as the limit itself.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,10 +101,32 @@ class Battery:
             float(self.coulombic_efficiency),
         )
 
+    @property
+    def granted_window_j(self) -> tuple[float, float]:
+        """Stored energy between which a plan must stay: the window, and beyond it what rounding may take."""
+        low, high = energy_j(self, np.array([self.soc_min, self.soc_max]))
+        slack = max(_WINDOW_TOLERANCE * (high - low), _ENERGY_ROUNDING * high)
+        return float(low - slack), float(high + slack)
+
+    def within_window(self) -> BatteryArrays:
+        """The curves cut to the granted window, their ends interpolated: all that a proof may see of them."""
+        whole = self.arrays
+        ends = kernels.states(np.array(self.granted_window_j), whole)
+        inner = (self.soc > ends[0, 0]) & (self.soc < ends[0, 1])
+        first, last = ends[:, :1], ends[:, 1:]
+        points = np.stack([curve[inner] for curve in whole[:4]])
+        low, high = self.granted_window_j
+        return BatteryArrays(
+            *np.ascontiguousarray(np.concatenate([first, points, last], axis=1)),
+            np.concatenate([[low], whole.energy_j[inner], [high]]),
+            whole.capacity_as,
+            whole.coulombic_efficiency,
+        )
+
 
 def energy_j(battery: Battery, soc: float | Array) -> Array:
     """Stored energy at a state of charge within the curves."""
-    i = _segment(battery.soc, soc)
+    i = np.clip(np.searchsorted(battery.soc, soc, "right") - 1, 0, len(battery.soc) - 2)
     step = np.asarray(soc) - battery.soc[i]
     slope = np.diff(battery.open_circuit_v)[i] / np.diff(battery.soc)[i]
     volt_step = (battery.open_circuit_v[i] + slope * step / 2) * step
@@ -108,53 +135,84 @@ def energy_j(battery: Battery, soc: float | Array) -> Array:
 
 def soc(battery: Battery, energy: float | Array) -> Array:
     """State of charge at a stored energy: the inverse of `energy_j`."""
-    i = _segment(battery.point_energy_j, energy)
-    low_v = battery.open_circuit_v[i]
-    slope = np.diff(battery.open_circuit_v)[i] / np.diff(battery.soc)[i]
-    charge = (np.asarray(energy) - battery.point_energy_j[i]) / battery.capacity_as
-    root = np.sqrt(np.maximum(low_v**2 + 2 * slope * charge, 0.0))
-    return battery.soc[i] + 2 * charge / (low_v + root)
+    return states(battery, energy)[0]
+
+
+def states(battery: Battery, energy: float | Array) -> Array:
+    """(4, ...) SOC, open-circuit voltage, discharge and charge resistance at stored energies."""
+    energy = np.asarray(energy, dtype=np.float64)
+    return kernels.states(energy.ravel(), battery.arrays).reshape(4, *energy.shape)
+
+
+def source_power_w(power_w: Array, open_circuit_v: Array | float, ohm: Array | float) -> Array:
+    """Uoc I, of which the terminals get P and R I² is lost; NaN beyond what the voltage can deliver."""
+    parts = np.broadcast_arrays(power_w, open_circuit_v, ohm)
+    flat = kernels.source_powers(*(np.ravel(part).astype(np.float64) for part in parts))
+    return flat.reshape(parts[0].shape)
 
 
 def chemical_power_w(
     battery: Battery, power_w: Array, open_circuit_v: Array | float, resistance_ohm: Array | float
 ) -> Array:
     """Rate at which stored energy falls for a terminal power; NaN beyond what the voltage can deliver."""
-    root = open_circuit_v**2 - 4 * resistance_ohm * power_w
-    current = 2 * power_w / (open_circuit_v + np.sqrt(np.where(root >= 0, root, np.nan)))
-    chemical = open_circuit_v * current
+    chemical = source_power_w(power_w, open_circuit_v, resistance_ohm)
     return np.where(power_w < 0, battery.coulombic_efficiency * chemical, chemical)
 
 
 def best_voltage_and_resistance(battery: Battery, charging: bool) -> tuple[float, float]:
     """Highest voltage and lowest resistance within the SOC window: no state of charge loses less."""
-    curve = battery.charge_ohm if charging else battery.discharge_ohm
-    inside = (battery.soc > battery.soc_min) & (battery.soc < battery.soc_max)
-    ends = np.interp([battery.soc_min, battery.soc_max], battery.soc, curve)
-    voltage = float(np.interp(battery.soc_max, battery.soc, battery.open_circuit_v))
-    return voltage, float(min(ends.min(), curve[inside].min(initial=np.inf)))
+    inside = battery.within_window()
+    curve = inside.charge_ohm if charging else inside.discharge_ohm
+    return float(inside.open_circuit_v.max()), float(curve.min())
 
 
-def within_limits(battery: Battery, power_w: Array) -> NDArray[np.bool_]:
-    """Where the battery can deliver or take a power at every SOC of its window."""
-    lowest_v = float(np.interp(battery.soc_min, battery.soc, battery.open_circuit_v))
-    inside = (battery.soc > battery.soc_min) & (battery.soc < battery.soc_max)
-    edges = [battery.soc_min, battery.soc_max]
-    highest_ohm = [
-        max(np.interp(edges, battery.soc, r).max(), r[inside].max(initial=0.0))
-        for r in (battery.discharge_ohm, battery.charge_ohm)
-    ]
-    resistance = np.where(power_w < 0, highest_ohm[1], highest_ohm[0])
-    root = lowest_v**2 - 4 * resistance * power_w
-    current = 2 * power_w / (lowest_v + np.sqrt(np.maximum(root, 0.0)))
+def power_limits_w(battery: Battery) -> tuple[float, float]:
+    """Least and greatest terminal power that the battery takes and delivers at every SOC of its window.
+
+    Between two points of the curves U and R are linear in SOC. With a current limit i it takes U i + R i², linear,
+    so least at a point. It delivers U i - R i², linear, or where i is beyond U / 2R the peak U² / 4R, which is
+    convex (a square over a linear function): least at a point, where both are the same, or where the peak is
+    level, at 2 R U' = U R'.
+    """
+    ends = np.array([battery.soc_min, battery.soc_max])
+    inner = battery.soc[(battery.soc > ends[0]) & (battery.soc < ends[1])]
+    points = np.concatenate([ends[:1], inner, ends[1:]])
+    voltage, discharge, charge = (
+        np.interp(points, battery.soc, curve)
+        for curve in (battery.open_circuit_v, battery.discharge_ohm, battery.charge_ohm)
+    )
+    limit = battery.current_max_charge_a
+    taken = np.inf if limit == np.inf else float(np.min(voltage * limit + charge * limit**2))
+    delivered = _least_delivered_w(voltage, discharge, battery.current_max_discharge_a)
     return (
-        (root >= 0)
-        & (power_w <= battery.power_max_discharge_w)
-        & (power_w >= -battery.power_max_charge_w)
-        & (current <= battery.current_max_discharge_a)
-        & (current >= -battery.current_max_charge_a)
+        -min(taken, battery.power_max_charge_w),
+        min(delivered, battery.power_max_discharge_w),
     )
 
 
-def _segment(points: Array, value: float | Array) -> NDArray[np.int64]:
-    return np.clip(np.searchsorted(points, value, "right") - 1, 0, len(points) - 2)
+def within_limits(battery: Battery, power_w: Array) -> NDArray[np.bool_]:
+    """Where the battery can deliver or take a power at every SOC of its window, rounding aside."""
+    least, greatest = power_limits_w(battery)
+    return (power_w >= least * (1 + _ROUNDING)) & (power_w <= greatest * (1 + _ROUNDING))
+
+
+def _least_delivered_w(voltage: Array, ohm: Array, current_a: float) -> float:
+    """Least over the segments between points of the most that voltage and current limit let through."""
+    volt_step, ohm_step = np.diff(voltage), np.diff(ohm)
+    low_v, low_ohm = voltage[:-1], ohm[:-1]
+    bends = [np.zeros_like(low_v), np.ones_like(low_v)]
+    pairs = [(ohm_step * low_v - 2 * volt_step * low_ohm, volt_step * ohm_step)]
+    if current_a < np.inf:
+        pairs.append((2 * current_a * low_ohm - low_v, volt_step - 2 * current_a * ohm_step))
+    for over, under in pairs:
+        share = np.divide(over, under, out=np.zeros_like(over), where=under != 0)
+        bends.append(np.clip(share, 0.0, 1.0))
+    share = np.stack(bends)
+    at_v, at_ohm = low_v + share * volt_step, low_ohm + share * ohm_step
+    half_v = at_v / 2
+    peak_a = np.divide(half_v, at_ohm, out=np.full_like(at_v, np.inf), where=at_ohm > 0)
+    flowing = np.minimum(current_a, peak_a)
+    bounded = np.isfinite(flowing)
+    flowing = np.where(bounded, flowing, 0.0)
+    through = np.where(flowing < peak_a, at_v * flowing - at_ohm * flowing**2, half_v * flowing)
+    return float(np.min(np.where(bounded, through, np.inf)))

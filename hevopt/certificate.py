@@ -9,16 +9,19 @@ while the rollout's gap is above a target.
     lower-bound DP   a cost-to-go that is nowhere above the true one, for costs of switching (lower_dp.py)
 
 A bound holds for the tabulated controls, for every strategy alike. The first three hold for every end charge,
-moving with it by their price at the end; the last one for the asked end charge or more.
+moving with it by their price at the end; the last one for the asked end charge or more. Each is lowered by what
+rounding could have added (prices.py, lower_dp.py) and then held against the plan in hand: one above it is an error.
 """
 
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 
+import numpy as np
+
 from hevopt.errors import SolverError
-from hevopt.lower_dp import lower_bound_kg
-from hevopt.prices import Line, one_price_dual
+from hevopt.lower_dp import end_slack_j, lower_bound_kg
+from hevopt.prices import EPSILON, Line, one_price_dual
 from hevopt.problem import Problem, Trajectory
 from hevopt.step_prices import costate_dual, lp_dual
 
@@ -28,8 +31,6 @@ SCOPE = "tabulated controls"
 LOWER_DP_NODES = (16_001, 64_001)
 # Share of the window within which a rollout counts as touching its end.
 _TOUCH = 2e-3
-# Sums of some thousand terms: a bound is lowered by what rounding could have added.
-_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,25 +38,47 @@ class Certificate:
     """Bounds on cost (kg: fuel, plus weighted NOx) for any end charge, as supporting lines.
 
     proofs: kind of proof -> its lines; the highest line at an end charge is the bound there
-    at_least: kind of proof -> bound for end charges of end_min_j or more
+    at_least: kind of proof -> bound for end charges of end_min_j or more, end_slack_j less by rounding
+    failures: kind of proof -> why it was tried and not found
     """
 
     end_min_j: float
     proofs: dict[str, list[Line]]
     at_least: dict[str, float] = field(default_factory=dict)
+    failures: dict[str, str] = field(default_factory=dict)
+    end_slack_j: float = 0.0
 
     def bound_kg(self, end_j: float) -> tuple[float, str]:
         """The highest proven bound for plans that end with at least `end_j`, and its kind of proof."""
+        return max(self._bounds(end_j))
+
+    def bound_of(self, plan: Trajectory) -> tuple[float, str]:
+        """The bound at a plan's own end charge and its kind of proof; at most the plan's cost, within rounding.
+
+        Raises SolverError where a proof contradicts the plan.
+        """
+        bounds = self._bounds(plan.end_j)
+        for bound, kind in bounds:
+            if bound - plan.cost_kg > _cost_rounding_kg(plan):
+                raise SolverError(
+                    f"the proof contradicts a plan: by {kind} no plan that ends with its charge costs less than "
+                    f"{bound:.12g} kg, and it costs {plan.cost_kg:.12g} kg; this is a fault of hevopt, not of "
+                    "the inputs: please report this, with the inputs"
+                )
+        bound, kind = max(bounds)
+        return min(bound, plan.cost_kg), kind
+
+    def _bounds(self, end_j: float) -> list[tuple[float, str]]:
         extra_j = end_j - self.end_min_j
+        rounding_j = 4 * EPSILON * (abs(end_j) + abs(self.end_min_j))
         bounds = [
-            (line.value_kg + line.price_kgpj * extra_j, kind)
+            (line.value_kg + line.price_kgpj * (extra_j - rounding_j), kind)
             for kind, lines in self.proofs.items()
             for line in lines
         ]
-        if extra_j >= 0:
+        if extra_j >= -self.end_slack_j:
             bounds += [(bound, kind) for kind, bound in self.at_least.items()]
-        best, kind = max(bounds)
-        return best - _ROUNDING * abs(best), kind
+        return bounds
 
     @property
     def price_kgpj(self) -> float:
@@ -67,23 +90,39 @@ class Certificate:
 def certify(
     problem: Problem, rollout: Trajectory | None = None, *, target_gap: float = TARGET_GAP
 ) -> Certificate:
-    """The certificate of a problem; with a rollout, its costate prices, and dearer rungs up to `target_gap`."""
-    certificate = Certificate(problem.end_min_j, {"one multiplier": one_price_dual(problem)})
+    """The certificate of a problem; with a rollout, its costate prices, and dearer rungs up to `target_gap`.
+
+    A rung that fails is left out and named in `failures`. Raises SolverError where a bound is above the rollout.
+    """
+    lines = one_price_dual(problem)
+    certificate = Certificate(
+        problem.end_min_j, {"one multiplier": lines}, end_slack_j=end_slack_j(problem)
+    )
     if rollout is None:
         return certificate
     worth = certificate.price_kgpj
-    certificate.proofs["costate prices"] = costate_dual(problem, rollout)
-    if _gap(certificate, rollout) > target_gap and _touches_window(problem, rollout):
-        # Without prices there is no proof of this kind; the next one needs none.
-        with suppress(SolverError):
-            certificate.proofs["LP prices"] = lp_dual(problem, rollout)
+    _gap(certificate, rollout)
+    _try_prices(certificate, "costate prices", lambda: costate_dual(problem, rollout))
+    gap = _gap(certificate, rollout)
+    if gap > target_gap and _touches_window(problem, rollout):
+        _try_prices(certificate, "LP prices", lambda: lp_dual(problem, rollout))
+        gap = _gap(certificate, rollout)
     for nodes in LOWER_DP_NODES:
-        if _gap(certificate, rollout) <= target_gap:
+        if gap <= target_gap:
             break
         best = certificate.at_least.get("lower-bound DP", -inf)
         bound = lower_bound_kg(problem, worth, nodes=nodes)
         certificate.at_least["lower-bound DP"] = max(best, bound)
+        gap = _gap(certificate, rollout)
     return certificate
+
+
+def _try_prices(certificate: Certificate, kind: str, lines: Callable[[], list[Line]]) -> None:
+    """Add a rung; without its prices there is no proof of the kind, and the next one needs none."""
+    try:
+        certificate.proofs[kind] = lines()
+    except SolverError as error:
+        certificate.failures[kind] = str(error)
 
 
 def _touches_window(problem: Problem, rollout: Trajectory) -> bool:
@@ -93,5 +132,11 @@ def _touches_window(problem: Problem, rollout: Trajectory) -> bool:
 
 
 def _gap(certificate: Certificate, rollout: Trajectory) -> float:
-    bound, _ = certificate.bound_kg(rollout.end_j)
+    """How far the rollout is above its bound; every bound is held against it on the way."""
+    bound, _ = certificate.bound_of(rollout)
     return (rollout.cost_kg - bound) / max(abs(bound), 1e-300)
+
+
+def _cost_rounding_kg(plan: Trajectory) -> float:
+    terms = float(np.sum(np.abs(plan.fuel_kg))) + abs(plan.cost_kg)
+    return EPSILON * (2 * len(plan.fuel_kg) + 48) * terms

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._choices_kernels import undominated
+from hevopt.errors import InfeasibleError
 from hevopt.problem import Problem
 
 Array = NDArray[np.float64]
@@ -69,17 +70,51 @@ def choices_of(problem: Problem) -> Choices:
     )
 
 
+def require_choices(problem: Problem, choices: Choices, strategy: str) -> None:
+    """InfeasibleError at the first step that has no usable control, for strategies that do not look ahead."""
+    empty = choices.first[:, 0] == choices.first[:, -1]
+    if empty.any():
+        k = int(np.argmax(empty))
+        raise InfeasibleError(
+            f"{strategy}: at step {k} (t = {problem.table.time_s[k]:g} s) every control is rejected; see reject of "
+            "the table"
+        )
+
+
+def require_path(problem: Problem, path: NDArray[np.int64], strategy: str) -> None:
+    """InfeasibleError at the first step where a path of (time,) entries has none, -1."""
+    if (path < 0).any():
+        k = int(np.argmax(path < 0))
+        raise InfeasibleError(
+            f"{strategy}: at step {k} (t = {problem.table.time_s[k]:g} s) every usable control needs a forbidden "
+            "switch, or more than the battery can deliver beyond its window; see switch_allowed of the table, or "
+            "use dp, which plans for it"
+        )
+
+
+def kept(choices: Choices, mask: NDArray[np.bool_]) -> Choices:
+    """The choices where an (entry,) mask holds."""
+    before = np.concatenate([[0], np.cumsum(mask)])
+    return choices._replace(
+        first=before[choices.first],
+        control=choices.control[mask],
+        cost_kg=choices.cost_kg[mask],
+        power_w=choices.power_w[mask],
+    )
+
+
 def without_dominated(choices: Choices) -> Choices:
     """The choices that no other of the same step and mode beats in both cost and battery power.
 
     Nothing is lost as long as more stored energy is never worse: true of every bound here, which lets charge
     be thrown away, and of a strategy except where a full battery forces it to charge less than it could.
-    Stored energy falls with battery power at every state of charge, so power alone decides.
+    Of two powers the higher drains more at every state of charge, so power alone decides; a step need not leave
+    the fuller of two charges the fuller, nothing rests on that.
     """
-    kept, first = undominated(choices.first, choices.cost_kg, choices.power_w)
+    best, first = undominated(choices.first, choices.cost_kg, choices.power_w)
     return choices._replace(
         first=first,
-        control=choices.control[kept],
-        cost_kg=choices.cost_kg[kept],
-        power_w=choices.power_w[kept],
+        control=choices.control[best],
+        cost_kg=choices.cost_kg[best],
+        power_w=choices.power_w[best],
     )

@@ -19,7 +19,11 @@ grid can be computed that is non-increasing and below  min over u of f_u + V(x +
    non-increasing. The true cost-to-go does not increase either, as charge may be thrown away.
 5. Modes. The least over modes of switching cost + W is concave in each cell wherever modes cross, so the line
    between its nodes is below it: no further correction.
-6. Ends. Above the top node V is constant: what does not fit is thrown away, a relaxation. Below the bottom node,
+6. Moves are taken upward, by what rounding may have done to them and to a plan's own trace, so that 1 to 3 hold as
+   computed; no move need be greater than the grid, whose top is as good as anything above it, nor less than the
+   grid downward, for a greater one proves less. What is left is rounding of values, some ten operations of each
+   step on figures of at most M, the most that any node holds: 16 epsilon T M is taken off.
+7. Ends. Above the top node V is constant: what does not fit is thrown away, a relaxation. Below the bottom node,
    and for charge missing at the end, V rises with a steep but finite slope: a relaxation too, for infinity is
    above it.
 
@@ -31,9 +35,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt import _lower_dp_kernels as kernels
-from hevopt.choices import Choices, choices_of, without_dominated
+from hevopt.choices import Choices, without_dominated
+from hevopt.prices import EPSILON, bounded_choices, drain_magnitude_w
 from hevopt.problem import Problem
-from hevopt.step_prices import convex_in_energy, window_cells
+from hevopt.step_prices import line_above, steep, window_cells
 
 Array = NDArray[np.float64]
 _PIECES = 16
@@ -43,29 +48,32 @@ _STEEPNESS = 4.0
 
 
 def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
-    """A bound on the cost of every plan that ends with at least the asked charge.
+    """A bound on the cost of every plan that ends with at least the asked charge, up to the rounding of a trace.
 
     price_kgpj: about what stored energy is worth; it sets the slope of the relaxation, any value is valid.
     """
-    choices = without_dominated(choices_of(problem))
-    low, high = problem.window_j
-    # Where a step can cross the whole window, smaller cells than its move would prove nothing more.
-    move_j = float(np.max(np.abs(choices.power_w), initial=0.0) * choices.step_s.max())
-    cell = max((high - low) / (nodes - 1), move_j / nodes)
+    choices = without_dominated(bounded_choices(problem))
+    low, high = problem.battery.granted_window_j
+    cell = (high - low) / (nodes - 1)
     # The asked end charge is a node, and the grid reaches up to a cell beyond the window: a relaxation.
-    below, above = (
-        np.ceil(reach / cell - 1e-9)
-        for reach in (problem.end_min_j - low, high - problem.end_min_j)
-    )
-    grid = problem.end_min_j + cell * np.arange(-below, max(above, 1.0) + 1)
+    end = problem.end_min_j - end_slack_j(problem)
+    below, above = np.ceil((end - low) / cell), np.ceil((high - end) / cell)
+    grid = end + cell * np.arange(-below, max(above, 1.0) + 1)
     slope = _STEEPNESS * max(price_kgpj, 1e-12)
-    terminal = slope * np.maximum(problem.end_min_j - grid, 0.0)
-    breaks, offset, rise = _move_bounds(problem, choices, grid, cell)
+    terminal = slope * np.maximum(end - grid, 0.0)
+    unreachable = _unreachable_kg(choices, terminal)
     value = kernels.lower_backward(
         choices.first, choices.cost_kg, choices.switch_kg, choices.switch_allowed, terminal,
-        breaks, offset, rise, slope * cell, _unreachable_kg(choices, terminal),
+        *_move_bounds(problem, choices, grid, cell), slope * cell, unreachable,
     )  # fmt: skip
-    return float(np.interp(problem.start_j, grid, value[problem.start_mode]))
+    bound = float(np.interp(problem.start_j, grid, value[problem.start_mode]))
+    most = abs(unreachable) + slope * 4.0 * (grid[-1] - grid[0])
+    return bound - 16.0 * EPSILON * choices.steps * most
+
+
+def end_slack_j(problem: Problem) -> float:
+    """How much less than the asked end charge a bound of this kind still covers: what a window is granted."""
+    return problem.battery.granted_window_j[1] - problem.window_j[1]
 
 
 def _move_bounds(
@@ -73,24 +81,34 @@ def _move_bounds(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Nodes that part the window into pieces, and per entry and piece an upper bound of its move in cells:
     offset + rise x node."""
-    pieces = _PIECES if convex_in_energy(problem) else _PIECES_CURVED
+    inside = problem.battery.within_window()
+    line = line_above(inside)
+    pieces = _PIECES_CURVED if line is None else _PIECES
     pieces = max(min(pieces, (len(grid) - 1) // 2), 1)
     breaks = np.arange(pieces + 1) * (len(grid) - 1) // pieces
-    if convex_in_energy(problem):
+    listed = choices.first, choices.power_w, choices.step_s
+    if line is None:
+        edges, *best = window_cells(problem, pieces)
+        offset = kernels.moves_by_cells(
+            *listed, cell, grid[breaks], edges, *best, inside.coulombic_efficiency
+        )
+        rise = np.zeros_like(offset)
+    else:
         offset, rise = kernels.moves_by_tangents(
-            choices.first, choices.power_w, choices.step_s, grid[0], cell, breaks,
-            problem.battery.arrays,
-        )  # fmt: skip
-        return breaks, offset, rise
-    edges, *best = window_cells(problem, pieces)
-    offset = kernels.moves_by_cells(
-        choices.first, choices.power_w, choices.step_s, cell, grid[breaks], edges, *best,
-        problem.battery.coulombic_efficiency,
-    )  # fmt: skip
-    return breaks, offset, np.zeros_like(offset)
+            *listed, steep(choices, line), grid[0], cell, breaks, *line.energy_j, line
+        )
+    magnitude_w = drain_magnitude_w(choices, inside, tangents=line is not None)
+    rounding = choices.spread(choices.step_s) * magnitude_w + float(np.abs(grid).max())
+    nodes = len(grid)
+    offset += 8.0 * EPSILON * (rounding[:, None] / cell + rise * nodes)
+    far = np.abs(offset) + rise * nodes > 2.0 * nodes
+    furthest = offset + rise * breaks[1:]
+    # A piece without a move, of a cell that the window does not touch, stays without.
+    offset = np.where(far & np.isfinite(offset), np.clip(furthest, -nodes, nodes), offset)
+    return breaks, offset, np.where(far, 0.0, rise)
 
 
 def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:
-    """More than any path can cost."""
-    worst_step = float(choices.cost_kg.max(initial=0.0)) + float(choices.switch_kg.max())
-    return worst_step * choices.steps + 2.0 * float(terminal_kg.max()) + 1e-3
+    """What a node counts from which no path is known: any figure is a bound there, one above all paths the best."""
+    worst_step = float(np.abs(choices.cost_kg).max(initial=0.0)) + float(choices.switch_kg.max())
+    return worst_step * choices.steps + 2.0 * float(terminal_kg.max())

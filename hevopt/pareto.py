@@ -136,7 +136,9 @@ def _solved(problem: Problem, solve: Callable[[Problem], Plan]) -> tuple[Point, 
     optimum = trajectory
     if solve is not dp.solve:
         optimum = simulate(problem, dp.solve(problem).control)
-    bound_kg, proof = certify(problem, optimum).bound_kg(problem.end_min_j)
+    certificate = certify(problem, optimum)
+    certificate.bound_of(trajectory)
+    bound_kg, proof = certificate.bound_kg(problem.end_min_j)
     weight = problem.nox_weight
     point = Point((weight,), trajectory.total_fuel_kg, trajectory.total_nox_kg)
     return point, HalfPlane(weight, float(bound_kg), proof)
@@ -150,7 +152,7 @@ def _front(solved: Sequence[tuple[Point, HalfPlane]]) -> Front:
         _gap(points, corners, half_planes, weight)
         for weight in [h.nox_weight for h in half_planes] + _ties(points)
     )
-    return Front(points, half_planes, corners, gap)
+    return Front(points, half_planes, corners, max(gap, 0.0))
 
 
 def _supported(plans: Sequence[Point], weights: Sequence[float]) -> tuple[Point, ...]:
@@ -246,7 +248,8 @@ def figures_of(found: Front, car: Architecture, cycle: Cycle, strategy: str) -> 
     """The front in the units of a report, for JSON and pages.
 
     bound_l_per_100km: least fuel + weight x NOx of any plan, as fuel volume, at the point's first weight
-    gap_percent: how far the point's own sum is above it
+    gap_percent: how far the point's own sum is above it; None for a bound of 0, and for a plan that ends with less
+    charge than asked and costs less than the bound
     outer: the outer front from the points' most NOx to their least, its ends and the corners between
     """
 
@@ -261,6 +264,9 @@ def figures_of(found: Front, car: Architecture, cycle: Cycle, strategy: str) -> 
     for point in found.points:
         plane = planes[point.nox_weights[0]]
         excess_kg = point.cost_kg(plane.nox_weight) - plane.bound_kg
+        # A plan that ends short of the charge asked may cost less than any that does not.
+        short = excess_kg < -_SAME * abs(plane.bound_kg)
+        known = plane.bound_kg > 0 and not short
         points.append(
             {
                 "nox_weight": plane.nox_weight,
@@ -269,7 +275,7 @@ def figures_of(found: Front, car: Architecture, cycle: Cycle, strategy: str) -> 
                 "fuel_l_per_100km": litres(point.fuel_kg),
                 "nox_mg_per_km": milligrams(point.nox_kg),
                 "bound_l_per_100km": litres(plane.bound_kg),
-                "gap_percent": 100 * excess_kg / plane.bound_kg if plane.bound_kg > 0 else None,
+                "gap_percent": 100 * max(excess_kg, 0.0) / plane.bound_kg if known else None,
                 "certificate": plane.proof,
             }
         )

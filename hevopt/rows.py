@@ -66,7 +66,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
     fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
     surplus_j = trajectory.end_j - problem.end_min_j
     fuel_j = fuel_kg * car.engine.heating_value_jpkg
-    bound_kg, proof = certificate.bound_kg(trajectory.end_j)
+    bound_kg, proof = certificate.bound_of(trajectory)
 
     def litres(mass_kg: float) -> float:
         return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)

@@ -17,8 +17,6 @@ from hevopt.errors import InfeasibleError
 from hevopt.problem import REJECT_WORDS, ControlTable, Problem, Trajectory
 
 Array = NDArray[np.float64]
-# Rounding of a trace of some thousand steps, as a share of the window.
-_WINDOW_TOLERANCE = 1e-9
 
 
 def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
@@ -110,9 +108,8 @@ def _check_usable(table: ControlTable, control: NDArray[np.int64]) -> None:
 
 
 def _check_window(problem: Problem, energy_j: Array) -> None:
-    low, high = problem.window_j
-    slack = _WINDOW_TOLERANCE * (high - low)
-    inside = (energy_j >= low - slack) & (energy_j <= high + slack)
+    low, high = problem.battery.granted_window_j
+    inside = (energy_j >= low) & (energy_j <= high)
     if not inside.all():
         k = int(np.argmin(inside))
         found = "more than the battery's voltage can deliver"
@@ -127,15 +124,9 @@ def _check_window(problem: Problem, energy_j: Array) -> None:
 def _battery_flows(problem: Problem, energy_j: Array, power_w: Array) -> dict[str, Array]:
     """Losses from current and resistance, to hold against the change of stored energy."""
     pack = problem.battery
-    soc = battery_model.soc(pack, energy_j[:-1])
-    voltage = np.interp(soc, pack.soc, pack.open_circuit_v)
-    resistance = np.where(
-        power_w < 0,
-        np.interp(soc, pack.soc, pack.charge_ohm),
-        np.interp(soc, pack.soc, pack.discharge_ohm),
-    )
-    root = np.sqrt(voltage**2 - 4 * resistance * power_w)
-    current = 2 * power_w / (voltage + root)
+    _, voltage, discharge, charge = battery_model.states(pack, energy_j[:-1])
+    resistance = np.where(power_w < 0, charge, discharge)
+    current = battery_model.source_power_w(power_w, voltage, resistance) / voltage
     coulombic = (1 - pack.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
     return {
         "battery_chemical_w": -np.diff(energy_j) / problem.table.step_s,

@@ -15,32 +15,40 @@ Shapes, both along a rollout:
                     within the window, its losses linear in x around the rollout: they jump where the window binds.
                     Whatever the LP's tolerance, g is evaluated afresh and stays a bound.
 
-The inner minimum over x. Where resistance is constant and Uoc linear in SOC within the window, r is convex in x:
-with r = U I, D = sqrt(U² - 4 R P), dr/dU = -2 R I² / D <= 0 rises with U, and U² is linear in x, so U is concave
-in x and r falls in U: a convex falling function of a concave one. Tangents at the window's ends and at the
-rollout lie below it, and the least of their upper envelope below its minimum. For other batteries the window is
-cut into cells; in each, r is at least its value at the cell's highest voltage and lowest resistance.
+The inner minimum over x. All curves are cut to the window (Battery.within_window): a kernel cannot look beyond it.
+Where resistance is constant and U² linear in stored energy, as where Uoc is linear in SOC, r is convex in x:
+with c = 4 R P and a = U², r is (a - sqrt(a (a - c))) / 2R, for charging times the coulombic efficiency; the root,
+of a square less a square, is concave in a, so r is convex in a, and a is linear in x. r falls with a. Tangents at
+the window's ends and at the rollout lie below it, and the least of their upper envelope below its minimum.
+Nothing rests on how nearly linear a curve is: tangents are taken on a line that is nowhere below U², at the lowest
+resistance, which loses no more than the battery (`line_above`). It is used where it lies close to the curve. For
+other batteries the window is cut into cells; in each, r is at least its value at the cell's highest voltage and
+lowest resistance.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt import _battery_kernels as battery_kernels
 from hevopt import _step_prices_kernels as kernels
 from hevopt import battery as battery_model
-from hevopt.choices import choices_of, without_dominated
+from hevopt._battery_kernels import BatteryArrays
+from hevopt.choices import Choices, without_dominated
 from hevopt.errors import SolverError
-from hevopt.prices import Line, dual
+from hevopt.prices import EPSILON, STEEPEST, Line, bounded_choices, dual, priced_rounding
 from hevopt.problem import Problem, Trajectory
 
 Array = NDArray[np.float64]
 CELLS = 256
+# Share of the highest U² by which a curve may leave a straight line and still be taken for one.
+_STRAIGHT = 1e-7
 
 
 def costate_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
     """Lines of the dual whose prices follow the costate equation along a rollout, the highest last."""
-    arrays = problem.battery.arrays
+    inside = problem.battery.within_window()
     power, step_s = rollout.battery_power_w, problem.table.step_s
-    return dual_of_shape(problem, rollout, kernels.costate(rollout.energy_j, power, step_s, arrays))
+    return dual_of_shape(problem, rollout, kernels.costate(rollout.energy_j, power, step_s, inside))
 
 
 def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
@@ -50,16 +58,47 @@ def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
 
 def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[Line]:
     """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0."""
-    choices = without_dominated(choices_of(problem))
-    pack, step_s = problem.battery, problem.table.step_s
-    low, high = problem.window_j
-    arguments = choices.first, choices.power_w, step_s, price, rollout.energy_j
-    if convex_in_energy(problem):
-        worth = kernels.worth_by_tangents(*arguments, low, high, pack.arrays)
+    if not (np.isfinite(price).all() and (price >= 0).all()):
+        raise SolverError("the prices of stored energy are not all finite and >= 0")
+    choices = without_dominated(bounded_choices(problem))
+    inside, step_s = problem.battery.within_window(), problem.table.step_s
+    line = line_above(inside)
+    arguments = choices.first, choices.power_w, step_s, price, problem.start_j
+    if line is not None:
+        worth = kernels.worth_by_tangents(
+            *arguments, rollout.energy_j, steep(choices, line), *line.energy_j, line
+        )
     else:
-        worth = kernels.worth_by_cells(*arguments, *window_cells(problem, CELLS), pack.arrays)
+        worth = kernels.worth_by_cells(*arguments, *window_cells(problem, CELLS), inside)
     constant = price[-1] * problem.end_min_j - price[0] * problem.start_j
-    return dual(problem, choices, worth, constant, float(price[-1]))
+    rounding = priced_rounding(problem, choices, price, tangents=line is not None)
+    return dual(problem, choices, worth, float(constant), float(price[-1]), rounding)
+
+
+def line_above(inside: BatteryArrays) -> BatteryArrays | None:
+    """A battery of one segment that loses no more than one cut to the window, at any stored energy there.
+
+    Its U² is linear in stored energy and nowhere below the curve's, its resistances are the lowest. None where
+    curve and line lie apart.
+    """
+    energy, squared = inside.energy_j, inside.open_circuit_v**2
+    chord = np.interp(energy, energy[[0, -1]], squared[[0, -1]])
+    over = squared - chord
+    ohms = inside.discharge_ohm, inside.charge_ohm
+    apart = [np.ptp(ohm) > _STRAIGHT * ohm.max() for ohm in ohms]
+    if np.abs(over).max() > _STRAIGHT * squared[-1] or any(apart):
+        return None
+    raised = np.sqrt(squared[[0, -1]] + max(over.max(), 0.0)) * (1 + 4 * EPSILON)
+    width = 2 * (energy[-1] - energy[0]) / (inside.capacity_as * raised.sum())
+    return BatteryArrays(
+        np.array([0.0, width]), raised, *(np.full(2, ohm.min()) for ohm in ohms),
+        energy[[0, -1]], inside.capacity_as, inside.coulombic_efficiency,
+    )  # fmt: skip
+
+
+def steep(choices: Choices, battery: BatteryArrays) -> NDArray[np.bool_]:
+    """(entry,) whether a power comes so near the voltage's peak that no tangent is of use."""
+    return battery_kernels.amplification(choices.power_w, battery) > STEEPEST
 
 
 def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
@@ -71,11 +110,11 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     from scipy.optimize import linprog
     from scipy.sparse import csr_array
 
-    choices = without_dominated(choices_of(problem))
+    choices = without_dominated(bounded_choices(problem))
     step = choices.spread(np.arange(choices.steps))
     drain_j, keep_j = kernels.linear_steps(
         choices.first, choices.power_w, choices.step_s, rollout.energy_j, rollout.battery_power_w,
-        problem.battery.arrays,
+        problem.battery.within_window(),
     )  # fmt: skip
     order = np.lexsort((choices.cost_kg, drain_j, step))
     corner = order[kernels.lower_hull(step, drain_j, choices.cost_kg, order)[order]]
@@ -104,38 +143,29 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     bounds[:segments] = 0.0, 1.0
     bounds[segments:] = low / scale_j, high / scale_j
     bounds[-1, 0] = problem.end_min_j / scale_j
+    # In units of the steps' own costs, so that the solver's tolerance is a share of them.
+    unit_kg = float(np.max(np.abs(np.diff(cost_kg)[inside]), initial=0.0)) or 1.0
     result = linprog(
-        np.concatenate([np.diff(cost_kg)[inside], np.zeros(steps)]),
+        np.concatenate([np.diff(cost_kg)[inside] / unit_kg, np.zeros(steps)]),
         A_ub=rows, b_ub=offset, bounds=bounds, method="highs",
     )  # fmt: skip
     if result.status != 0:
         raise SolverError(f"HiGHS stopped with status {result.status}: {result.message}")
     # A joule more after step t saves p: the multiplier of its row is -p.
-    return np.maximum(-result.ineqlin.marginals / scale_j, 0.0)
-
-
-def convex_in_energy(problem: Problem) -> bool:
-    """Whether resistance is constant and the voltage linear in SOC throughout the window."""
-    pack = problem.battery
-    first = int(np.searchsorted(pack.soc, pack.soc_min, "right")) - 1
-    last = int(np.searchsorted(pack.soc, pack.soc_max, "left"))
-    inside = slice(first, last + 1)
-    slopes = np.diff(pack.open_circuit_v[inside]) / np.diff(pack.soc[inside])
-    same = [np.ptp(r[inside]) == 0 for r in (pack.discharge_ohm, pack.charge_ohm)]
-    return all(same) and bool(np.ptp(slopes) <= 1e-12 * (1 + np.abs(slopes).max()))
+    return np.maximum(-result.ineqlin.marginals * (unit_kg / scale_j), 0.0)
 
 
 def window_cells(problem: Problem, cells: int) -> tuple[Array, Array, Array, Array]:
     """Edges (cell + 1,) over the window, with every point of the curves among them, and per cell the highest
     voltage and the lowest discharge and charge resistance."""
-    pack = problem.battery
-    edges_soc = np.union1d(
-        np.linspace(pack.soc_min, pack.soc_max, cells + 1),
-        pack.soc[(pack.soc > pack.soc_min) & (pack.soc < pack.soc_max)],
-    )
+    inside = problem.battery.within_window()
+    even = np.linspace(inside.soc[0], inside.soc[-1], cells + 1)
+    edges_soc = np.union1d(even, inside.soc)
     voltage, discharge, charge = (
-        np.interp(edges_soc, pack.soc, curve)
-        for curve in (pack.open_circuit_v, pack.discharge_ohm, pack.charge_ohm)
+        np.interp(edges_soc, inside.soc, curve)
+        for curve in (inside.open_circuit_v, inside.discharge_ohm, inside.charge_ohm)
     )
     lower = [np.minimum(r[1:], r[:-1]) for r in (discharge, charge)]
-    return battery_model.energy_j(pack, edges_soc), voltage[1:], *lower
+    edges = battery_model.energy_j(problem.battery, edges_soc)
+    edges[[0, -1]] = inside.energy_j[[0, -1]]
+    return edges, voltage[1:], *lower

@@ -180,7 +180,7 @@ def _cells(ranked: "Ranked") -> list[str]:
     figures = [f"{v:.4f}" if v is not None else "-" for v in (ranked.objective, ranked.bound)]
     gap = "-"
     if ranked.objective is not None and ranked.bound:
-        gap = f"{100 * (ranked.objective / ranked.bound - 1):.3f}"
+        gap = f"{100 * max(ranked.objective / ranked.bound - 1, 0.0):.3f}"
     return [str(ranked.design), *map(_value, ranked.parameters.values()), *figures, gap]
 
 

@@ -129,7 +129,7 @@ class Collector:
 def _car(case: Case) -> CarFigures:
     car, table, signals = case.car, case.problem.table, case.problem.table.signals
     rollout = simulate(case.problem, case.dp_plan.control)
-    bound_kg, _ = case.certificate.bound_kg(rollout.end_j)
+    bound_kg, _ = case.certificate.bound_of(rollout)
     missing = table.missing_torque_nm
     missing = np.zeros(len(table.time_s)) if missing is None else missing
     return CarFigures(

@@ -81,10 +81,12 @@ class Figures:
 
     @property
     def gap_percent(self) -> Array:
-        """How far the objective lies above the design's own bound."""
+        """How far the objective lies above the design's own bound; 0 where rounding puts it below."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(
-                self.bound > 0, 100 * (self.objective - self.bound) / self.bound, np.nan
+                self.bound > 0,
+                np.maximum(100 * (self.objective - self.bound) / self.bound, 0.0),
+                np.nan,
             )
 
 

@@ -48,7 +48,7 @@ def decide(k, first, cost, power, step_s, switch_kg, allowed, mode, energy, valu
             rate = chemical_power(power[i], voltage, discharge, charging, bat.coulombic_efficiency)
             after = energy - step_s[k] * rate
             outside = max(low - after, after - high)
-            if outside > 0.0:
+            if not outside <= 0.0:  # nor where the voltage cannot deliver the power, NaN
                 if outside < least_out:
                     least_out, way_out, out_mode, out_energy = outside, i, n, after
                 continue
@@ -161,6 +161,8 @@ def improve(first, cost, power, step_s, switch_kg, allowed, row_class, ahead, lo
                     rate = chemical_power(
                         power[i], voltage, discharge, charging, bat.coulombic_efficiency
                     )
+                    if np.isnan(rate):
+                        continue
                     wanted = j - step_s[r] * rate / cell
                     place = min(max(wanted, 0.0), nodes - 1.0)
                     paid = cost[i] + excess_kgpj * cell * abs(wanted - place)

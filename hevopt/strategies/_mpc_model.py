@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import Choices, choices_of
-from hevopt.errors import InfeasibleError
+from hevopt.choices import Choices, choices_of, require_choices
 from hevopt.prices import drain_at_j
 from hevopt.problem import Problem, Signals
 from hevopt.strategies import _mpc_kernels as kernels
@@ -44,7 +43,7 @@ class Model:
 def model_of(problem: Problem, horizon_s: float) -> Model:
     """The model of a problem under a preview of `horizon_s`."""
     choices, time_s = choices_of(problem), problem.table.time_s
-    _check_rows(problem, choices)
+    require_choices(problem, choices, "mpc")
     drain_j = drain_at_j(problem, choices, problem.start_j)
     listed = choices.cost_kg, drain_j
     fit = kernels.fits(choices.first, *listed, *kernels.falling_hull(choices.first, *listed))
@@ -72,13 +71,3 @@ def _recoverable_j(signals: Signals | None, cheapest_j: Array, last: NDArray[np.
     dropped = np.cumsum(np.where(braking, drop, 0.0))[last]
     rate = np.divide(returned, dropped, out=np.zeros_like(returned), where=dropped > 0)
     return rate * square[last]
-
-
-def _check_rows(problem: Problem, choices: Choices) -> None:
-    empty = choices.first[:, 0] == choices.first[:, -1]
-    if empty.any():
-        k = int(np.argmax(empty))
-        raise InfeasibleError(
-            f"mpc: every control is rejected at step {k} (t = {problem.table.time_s[k]:g} s); see reject "
-            "of the table"
-        )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import Choices, choices_of
+from hevopt.choices import Choices, choices_of, require_choices
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.prices import one_price_dual
 from hevopt.problem import Plan, Problem
@@ -66,6 +66,7 @@ def rules_of(problem: Problem) -> Rules:
     if table.signals is None:
         raise DataError("rule-based strategies need a table with signals (speed, power, gear)")
     choices = choices_of(problem)
+    require_choices(problem, choices, "the rules")
     engine_on = np.array([control.engine_on for control in table.controls])
     step = choices.spread(np.arange(choices.steps))
     fuel = table.fuel_kg[step, choices.control]
@@ -181,13 +182,13 @@ def _outcome(rules: Rules, engine: Entries, threshold_w: float) -> Outcome:
     )
     control = choices.control[entry]
     cost_kg, _ = total_cost_kg(problem, control)
-    slack = 1e-9 * (high - low)
+    least_j, greatest_j = problem.battery.granted_window_j
     return Outcome(
         control,
         cost_kg,
         float(np.sum(problem.table.nox_kg[np.arange(choices.steps), control])),
         float(energy[-1]) - problem.end_min_j,
-        bool((energy >= low - slack).all() and (energy <= high + slack).all())
+        bool((energy >= least_j).all() and (energy <= greatest_j).all())
         and bool(problem.table.switch_allowed[_modes(problem, control)].all()),
     )
 

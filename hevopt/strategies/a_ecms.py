@@ -31,7 +31,7 @@ the mean gap is 1.8 %, more than without, so it is off by default.
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import choices_of
+from hevopt.choices import choices_of, require_choices, require_path
 from hevopt.errors import DataError
 from hevopt.prices import drain_at_j
 from hevopt.problem import Plan, Problem
@@ -63,6 +63,7 @@ def solve(
         raise DataError(f"window_s {window_s}; allowed: {_WINDOW_MIN_S:g} s or more, or None")
     settings = feedback._replace(window_s=np.inf if window_s is None else float(window_s))
     choices = choices_of(problem)
+    require_choices(problem, choices, "a_ecms")
     low, high = problem.window_j
     path, factor, recovered = kernels.adaptive(
         choices.first, choices.cost_kg, choices.power_w, drain_at_j(problem, choices, problem.start_j),
@@ -70,6 +71,7 @@ def solve(
         problem.start_mode, problem.start_j, problem.end_min_j, low, high, settings,
         problem.battery.arrays,
     )  # fmt: skip
+    require_path(problem, path, "a_ecms")
     notes = settings._asdict() | {
         "window_s": window_s,
         "price_kgpj": float(factor.mean()),

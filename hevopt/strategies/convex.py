@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from hevopt._prices_kernels import shortest_path
 from hevopt.choices import Choices, choices_of
 from hevopt.errors import InfeasibleError
-from hevopt.prices import drain_at_j, dual, one_price_dual
+from hevopt.prices import drain_at_j, dual, one_price_dual, step_maxima
 from hevopt.problem import Plan, Problem
 from hevopt.simulation import total_cost_kg
 from hevopt.strategies._convex_model import SOLVER, Solution, optimum
@@ -39,6 +39,7 @@ _STIFFNESS = (0.1, 1.0, 3.0, 10.0)
 _LIFTS = (0.0, 1e-4, 2e-4)
 _BAND = 0.1
 _NODES = 201
+_WORTH_ROUNDING = 1e-13
 # The dual's top is a kink: the paths on either side are found this far from it.
 _BESIDE_TOP = 1e-6
 
@@ -126,8 +127,9 @@ def _mode_path(
     drain_j = drain_at_j(problem, choices, energy_j)
     excess_j = drain_j + choices.spread(np.diff(solution.energy_j))
     worth = choices.spread(solution.price_kgpj) * excess_j
+    rounding = _WORTH_ROUNDING * float(np.sum(step_maxima(choices, np.abs(worth))))
     try:
-        top = dual(problem, choices, worth, 0.0, float(solution.price_kgpj[-1]))[-1].scale
+        top = dual(problem, choices, worth, 0.0, 0.0, rounding)[-1].scale
     except InfeasibleError:
         top = 1.0
     found = []

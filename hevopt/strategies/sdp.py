@@ -27,7 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt import battery as battery_model
-from hevopt.choices import Choices, choices_of, without_dominated
+from hevopt.choices import (
+    Choices,
+    choices_of,
+    require_choices,
+    require_path,
+    without_dominated,
+)
 from hevopt.errors import DataError
 from hevopt.prices import one_price_dual
 from hevopt.problem import Plan, Problem, Signals
@@ -86,11 +92,13 @@ def solve(
     ahead, settled = _policy_map(problem, training, chain, price, recovered, nodes, memory_s)
     low, high = problem.window_j
     every = choices_of(problem)
+    require_choices(problem, every, "sdp")
     path = kernels.follow_map(
         every.first, every.cost_kg, every.power_w, every.step_s, every.switch_kg,
         every.switch_allowed, classes_of(chain, _signals(problem)), ahead, problem.start_mode,
         problem.start_j, low, (high - low) / (nodes - 1), problem.battery.arrays,
     )  # fmt: skip
+    require_path(problem, path, "sdp")
     notes = {
         "training": len(training), "classes": len(chain.speed_mps), "nodes": nodes,
         "memory_s": memory_s, "price_kgpj": price, "recovered_jpv2": recovered, "settled": settled,
@@ -219,9 +227,7 @@ def _recovered_jpv2(training: Sequence[Problem]) -> float:
         free = other.table.feasible & (other.table.fuel_kg == 0)
         power = np.where(free, other.table.battery_power_w, 0.0).min(axis=1)
         power = np.where(signals.wheel_power_w < 0, power, 0.0)
-        volt, ohm = (
-            np.interp(other.soc_start, pack.soc, c) for c in (pack.open_circuit_v, pack.charge_ohm)
-        )
+        _, volt, _, ohm = battery_model.states(pack, other.start_j)
         stored = -battery_model.chemical_power_w(pack, power, volt, ohm) * other.table.step_s
         gained += float(np.sum(stored))
         slowed += float(np.sum(np.maximum(-np.diff(signals.speed_mps**2), 0.0)))

@@ -103,7 +103,7 @@ def _strategy_row(solved: SolvedCase, strategy: str) -> dict[str, Any]:
     row, _, trajectory = run_case(solved, strategy)
     surplus_j = trajectory.end_j - solved.problem.end_min_j
     worth_kg = solved.certificate.price_kgpj * surplus_j
-    bound_kg, _ = solved.certificate.bound_kg(trajectory.end_j)
+    bound_kg, _ = solved.certificate.bound_of(trajectory)
     objective, bound = (
         _litres(solved.car, solved.cycle, mass_kg - worth_kg)
         for mass_kg in (trajectory.cost_kg, bound_kg)

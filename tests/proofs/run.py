@@ -1,0 +1,50 @@
+"""The attack on the proofs: random problems of the kinds that break them, each against trying every plan.
+
+    python tests/proofs/run.py --count 10000
+
+Problem n is always the same. Exit status 1 and one line per fault where something was wrong.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from proofs.check import faults_of
+from proofs.draw import draw
+
+# Strategies that take long are tried on every so many problems.
+_RARE_EVERY = 50
+
+
+def attack(problems: range, nodes: int = 1001) -> list[str]:
+    """The faults of a range of problems, each with its number; nodes: see `faults_of`."""
+    faults = []
+    for n in problems:
+        try:
+            found = faults_of(draw(n), every_strategy=n % _RARE_EVERY == 0, nodes=nodes)
+        except Exception as error:
+            found = [f"{type(error).__name__}: {error}"]
+        faults += [f"problem {n}: {fault}" for fault in found]
+    return faults
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--count", type=int, default=10_000, help="how many problems")
+    options.add_argument("--first", type=int, default=0, help="number of the first")
+    options.add_argument("--nodes", type=int, default=1001, help="of dp and of the last rungs")
+    given = options.parse_args()
+    faults = 0
+    for n in range(given.first, given.first + given.count):
+        for fault in attack(range(n, n + 1), given.nodes):
+            faults += 1
+            print(fault, flush=True)
+    print(f"{given.count} problems, {faults} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
