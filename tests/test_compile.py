@@ -135,9 +135,10 @@ def figures() -> str:
             lower_bound_kg(problem, worth.price_kgpj, nodes=101),
         ]
         choices, low_high = choices_of(problem), np.array(problem.window_j)
+        terminal = np.tile(np.linspace(1e-3, 0.0, 31), (choices.modes, 1))
         value = _rollout_kernels.backward(
             choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-            choices.switch_allowed, np.linspace(1e-3, 0.0, 31), np.full(choices.steps + 1, low_high[0]),
+            choices.switch_allowed, terminal, np.full(choices.steps + 1, low_high[0]),
             np.ptp(low_high) / 30, 1e-4, 0.0, 1.0, problem.battery.arrays,
         )  # fmt: skip
         found += [rollout.cost_kg, rollout.end_j, *bounds, *value[0].flat]

@@ -4,6 +4,7 @@ Shared by every strategy that looks ahead. The value function is linear between 
 two nodes make it a plain price on stored energy.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,14 +57,37 @@ def roll(
 
     grid_low_j: (time + 1,)
     """
-    budget = _MOVES_PER_STEP * choices.steps + 10_000
-    path, steps, furthest, moves = kernels.rollout(
-        choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-        choices.switch_allowed, problem.start_mode, problem.start_j, value_kg, grid_low_j, cell_j,
-        reach.least_j, reach.greatest_j, problem.battery.arrays, budget,
+    return follow(problem, choices, reach, lambda step: (0, value_kg), grid_low_j, cell_j)
+
+
+def follow(
+    problem: Problem,
+    choices: Choices,
+    reach: Reach,
+    block_of: Callable[[int], tuple[int, Array]],
+    grid_low_j: Array,
+    cell_j: float,
+) -> NDArray[np.int64]:
+    """As `roll`, with a value function that comes by blocks.
+
+    block_of: step -> first step of its block, and (step + 1, mode, node) values from there on
+    """
+    steps, budget = choices.steps, _MOVES_PER_STEP * choices.steps + 10_000
+    progress = kernels.Progress(
+        np.full(steps, -1), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64),
+        np.zeros(len(choices.cost_kg), dtype=bool), np.zeros(3, dtype=np.int64),
     )  # fmt: skip
-    if steps == choices.steps:
-        return path
+    progress.energy[0], progress.mode[0] = problem.start_j, problem.start_mode
+    while 0 <= progress.at[0] < steps and progress.at[2] < budget:
+        begin, value_kg = block_of(int(progress.at[0]))
+        kernels.rollout(
+            choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
+            choices.switch_allowed, begin, value_kg, grid_low_j, cell_j, reach.least_j,
+            reach.greatest_j, problem.battery.arrays, progress, budget,
+        )  # fmt: skip
+    reached, furthest, moves = progress.at
+    if reached == steps:
+        return progress.path
     where = f"step {furthest} (t = {problem.table.time_s[furthest]:g} s)"
     if moves < budget:
         raise InfeasibleError(

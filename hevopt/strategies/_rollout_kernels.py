@@ -1,6 +1,9 @@
 """Compiled reachability, backward recursion and rollout, all on stored energy with the true battery step."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from hevopt._battery_kernels import chemical_power, chemical_power_at, state_at
 from hevopt._compile import compiled
@@ -62,28 +65,39 @@ def reachable(first, power, step_s, allowed, low, high, end_min, battery):
     return least, greatest
 
 
-@compiled()
-def rollout(first, cost, power, step_s, switch_kg, allowed, start_mode, start, value, grid_low,
-            cell, least, greatest, battery, budget):  # fmt: skip
-    """Entries (time,) of the path that follows a value function, and the steps it reached.
+class Progress(NamedTuple):
+    """How far a rollout has come.
 
-    value: (time + 1, mode, node) cost-to-go at stored energy grid_low[k] + cell x node, linear between nodes
-    and beyond them.
+    path: (time,) entries; energy, mode: (time + 1,) before each step; closed: (entry,) dead ends
+    at: [present step, furthest step, moves made]
+    """
+
+    path: NDArray[np.int64]
+    energy: NDArray[np.float64]
+    mode: NDArray[np.int64]
+    closed: NDArray[np.bool_]
+    at: NDArray[np.int64]
+
+
+@compiled()
+def rollout(first, cost, power, step_s, switch_kg, allowed, begin, value, grid_low, cell, least,
+            greatest, battery, progress, budget):  # fmt: skip
+    """Go on along a value function until its last step, or back out of its first one, `begin`.
+
+    value: (step + 1, mode, node) cost-to-go from `begin` on at stored energy grid_low[k] + cell x node, linear
+    between nodes and beyond them.
     A choice that leads where the end cannot be reached is not taken; a dead end is left the way it was
     entered and closed, so that with enough budget every path is tried.
     """
-    steps, modes = first.shape[0], first.shape[1] - 1
-    nodes = value.shape[2]
-    slack = 1e-12 * abs(greatest[steps, 0])
-    path = np.full(steps, -1, dtype=np.int64)
-    closed = np.zeros(len(cost), dtype=np.bool_)
-    energy = np.empty(steps + 1)
-    mode = np.empty(steps + 1, dtype=np.int64)
-    energy[0], mode[0] = start, start_mode
-    k, furthest, moves = 0, 0, 0
-    while k < steps and moves < budget:
+    modes, nodes = first.shape[1] - 1, value.shape[2]
+    end = begin + len(value) - 1
+    slack = 1e-12 * abs(greatest[-1, 0])
+    path, energy, mode, closed, at = progress
+    k, furthest, moves = at[0], at[1], at[2]
+    while begin <= k < end and moves < budget:
         moves += 1
         best, chosen, chosen_mode, chosen_energy = np.inf, -1, 0, 0.0
+        ahead = value[k + 1 - begin]
         _, voltage, discharge, charging = state_at(energy[k], battery)
         for n in range(modes):
             if not allowed[mode[k], n]:
@@ -100,22 +114,21 @@ def rollout(first, cost, power, step_s, switch_kg, allowed, start_mode, start, v
                 place = (after - grid_low[k + 1]) / cell
                 j = min(max(int(np.floor(place)), 0), nodes - 2)
                 share = place - j
-                to_go = value[k + 1, n, j] * (1.0 - share) + value[k + 1, n, j + 1] * share
+                to_go = ahead[n, j] * (1.0 - share) + ahead[n, j + 1] * share
                 total = cost[i] + switch_kg[mode[k], n] + to_go
                 if total < best:
                     best, chosen, chosen_mode, chosen_energy = total, i, n, after
         if chosen < 0:
             closed[first[k, 0] : first[k, modes]] = False
             k -= 1
-            if k < 0:
-                break
-            closed[path[k]] = True
+            if k >= 0:
+                closed[path[k]] = True
             continue
         path[k] = chosen
         energy[k + 1], mode[k + 1] = chosen_energy, chosen_mode
         k += 1
         furthest = max(furthest, k)
-    return path, k, furthest, moves
+    at[0], at[1], at[2] = k, furthest, moves
 
 
 @compiled()
@@ -200,17 +213,17 @@ def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low,
              ceiling_kg, unreachable_kg, battery):  # fmt: skip
     """Cost-to-go (time + 1, mode, node) by value iteration over stored energy grid_low[k] + cell x node.
 
+    terminal: (mode, node) cost-to-go after the last step.
     A choice moves every node by nearly the same energy; between the points of the battery's curves the move
     is taken as linear in the node, so that the inner loop runs over contiguous memory. Switching is added
     once per mode, after the minimum over the mode's choices.
     """
     steps, modes = first.shape[0], first.shape[1] - 1
-    nodes = len(terminal)
+    nodes = terminal.shape[1]
     value = np.empty((steps + 1, modes, nodes))
     least = np.empty((modes, nodes))
     efficiency = battery.coulombic_efficiency
-    for m in range(modes):
-        value[steps, m] = terminal
+    value[steps] = terminal
     for k in range(steps - 1, -1, -1):
         breaks, states = _bends(grid_low[k], cell, nodes, battery)
         drift = (grid_low[k] - grid_low[k + 1]) / cell

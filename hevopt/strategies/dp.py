@@ -23,7 +23,8 @@ from hevopt.prices import one_price_dual, typical_price_kgpj
 from hevopt.problem import Plan, Problem
 from hevopt.simulation import total_cost_kg
 from hevopt.strategies import _rollout_kernels as kernels
-from hevopt.strategies._rollout import Reach, reach_of, roll
+from hevopt.strategies._rollout import Reach, follow, reach_of
+from hevopt.strategies._value_blocks import ValueBlocks
 
 Array = NDArray[np.float64]
 ENERGY_NODES = 1001
@@ -106,15 +107,22 @@ def _solve_on_grid(
     problem, choices, penalty = setting.problem, setting.choices, setting.penalty_kgpj
     last_grid = grid_low[-1] + cell * np.arange(nodes)
     terminal = penalty * np.maximum(problem.end_min_j - last_grid, 0.0)
-    value = kernels.backward(
-        choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-        choices.switch_allowed, terminal, grid_low, cell, penalty * cell,
-        penalty * cell if setting.hard_top else 0.0, _unreachable_kg(choices, terminal),
-        problem.battery.arrays,
-    )  # fmt: skip
+    unreachable = _unreachable_kg(choices, terminal)
+
+    def backward(begin: int, end: int, after: Array) -> Array:
+        return kernels.backward(
+            choices.first[begin:end], choices.cost_kg, choices.power_w, choices.step_s[begin:end],
+            choices.switch_kg, choices.switch_allowed, after, grid_low[begin : end + 1], cell,
+            penalty * cell, penalty * cell if setting.hard_top else 0.0, unreachable,
+            problem.battery.arrays,
+        )  # fmt: skip
+
+    values = ValueBlocks(choices.steps, np.tile(terminal, (choices.modes, 1)), backward)
     first_grid = grid_low[0] + cell * np.arange(nodes)
-    promised = float(np.interp(problem.start_j, first_grid, value[0, problem.start_mode]))
-    return roll(problem, setting.every, setting.reach, value, grid_low, cell), promised
+    at_start = values.block_of(0)[1][0, problem.start_mode]
+    promised = float(np.interp(problem.start_j, first_grid, at_start))
+    path = follow(problem, setting.every, setting.reach, values.block_of, grid_low, cell)
+    return path, promised
 
 
 def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:

@@ -64,7 +64,7 @@ def backward_call(problem: Problem, nodes: int) -> tuple[Callable[[], object], i
     def call() -> object:
         return kernels.backward(
             choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-            choices.switch_allowed, terminal, grid_low, cell, 1e-7 * cell, 0.0, 1.0,
+            choices.switch_allowed, np.tile(terminal, (choices.modes, 1)), grid_low, cell, 1e-7 * cell, 0.0, 1.0,
             problem.battery.arrays,
         )  # fmt: skip
 
