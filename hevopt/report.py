@@ -14,6 +14,7 @@ from hevopt.files import printable
 from hevopt.problem import Plan, Problem
 from hevopt.published import published_beside
 from hevopt.rows import Row, end_asked_text, marked, no_reference_text
+from hevopt.status import Mark
 from hevopt.strategies import STRATEGIES
 from hevopt.study import Comparison
 from hevopt.writing import write_whole
@@ -90,7 +91,7 @@ def _cells(row: Row) -> list[str]:
         number(row.gap_percent, ".3f"),
         (row.certificate or "-").split(",")[0],
         number(row.solve_s, ".2f"),
-        row.status,
+        str(row.status),
     ]
 
 
@@ -199,10 +200,8 @@ def strategies_page(comparisons: Sequence[Comparison], steps: Mapping[str, int])
 def _gap_cell(row: Row | None) -> str:
     if row is None or row.gap_percent is None:
         return "-" if row is None else "failed"
-    marks = ("*" if "not neutral" in row.status else "") + (
-        "!" if "shortfall" in row.status else ""
-    )
-    return f"{row.gap_percent:.3f}{marks}"
+    star = "*" if row.status.charge is Mark.NOT_NEUTRAL else ""
+    return f"{row.gap_percent:.3f}{star}{'!' if row.status.shortfall_steps else ''}"
 
 
 def calibration_table(plan: Plan) -> Table | None:

@@ -1,7 +1,7 @@
 """Rows: the figures of one architecture and strategy, made of a case and a trajectory, and their reference."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from hevopt.architecture import Architecture
 from hevopt.case import Case
@@ -9,6 +9,7 @@ from hevopt.certificate import SCOPE
 from hevopt.errors import HevoptError
 from hevopt.files import printable
 from hevopt.problem import Problem, Trajectory
+from hevopt.status import Mark, Status
 from hevopt.units import litres_per_100km
 
 NEUTRAL_PERCENT = 1.0
@@ -23,9 +24,7 @@ class Row:
     """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
     no reference, no fuel, or a bound of 0; of NOx also where the engine has no data on it.
 
-    status: "ok", "not neutral" (end charge off by more than 1 % of the fuel's energy; where another end charge than
-    the start's is asked, "end charge missed" below it and "end charge above" beyond it), "shortfall" (steps driven
-    with less than the cycle asks), joined by commas, or "failed: ..." with the reason
+    status: its marks, or why it has no figures
     delta_energy_percent: stored energy at the end above what is asked, as a share of the fuel's;
     fuel_corrected_l_per_100km: fuel less what that energy is worth
     bound_l_per_100km: least of fuel + weighted NOx that any plan with this row's end charge could reach,
@@ -34,7 +33,7 @@ class Row:
 
     architecture: str
     strategy: str
-    status: str
+    status: Status
     fuel_l_per_100km: float | None = None
     delta_fuel_percent: float | None = None
     co2_g_per_km: float | None = None
@@ -56,8 +55,8 @@ class Row:
         return self.fuel_l_per_100km is not None
 
     def as_dict(self) -> dict:
-        """All fields by name, in order."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        """All fields by name, in order, as JSON has them: the status as text."""
+        return {f.name: getattr(self, f.name) for f in fields(self)} | {"status": str(self.status)}
 
 
 def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
@@ -92,7 +91,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
 
 def failed_row(car: Architecture, strategy: str, error: HevoptError) -> Row:
     """The row of a strategy that has no figures."""
-    return Row(car.name, strategy, f"failed: {str(error).splitlines()[0].rstrip(':')}")
+    return Row(car.name, strategy, Status(failure=str(error).splitlines()[0].rstrip(":")))
 
 
 def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
@@ -103,7 +102,7 @@ def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
     candidates = [row for row in named or rows if row.solved]
     if not candidates:
         return rows, None
-    base = next((row for row in candidates if row.status == "ok"), candidates[0])
+    base = next((row for row in candidates if row.status.ok), candidates[0])
 
     def change(value: float | None, reference: float | None) -> float | None:
         if value is None or reference is None or reference < _TINY:
@@ -111,12 +110,10 @@ def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:
         return 100 * (value / reference - 1)
 
     changed = [
-        Row(
-            **row.as_dict()
-            | {
-                "delta_fuel_percent": change(row.fuel_l_per_100km, base.fuel_l_per_100km),
-                "delta_nox_percent": change(row.nox_mg_per_km, base.nox_mg_per_km),
-            }
+        replace(
+            row,
+            delta_fuel_percent=change(row.fuel_l_per_100km, base.fuel_l_per_100km),
+            delta_nox_percent=change(row.nox_mg_per_km, base.nox_mg_per_km),
         )
         for row in rows
     ]
@@ -145,12 +142,12 @@ def end_asked_text(end_asked: Mapping[str, float]) -> str:
     return "; ".join(f"{soc:g} in {', '.join(names)}" for soc, names in cars.items())
 
 
-def _status(problem: Problem, surplus_j: float, fuel_j: float) -> str:
-    marks = []
+def _status(problem: Problem, surplus_j: float, fuel_j: float) -> Status:
+    charge = None
     if not is_neutral(surplus_j, fuel_j):
-        missed = "end charge above" if surplus_j > 0 else "end charge missed"
-        marks.append("not neutral" if problem.end_min_j == problem.start_j else missed)
-    return ", ".join(marks + shortfall_marks(problem)) or "ok"
+        missed = Mark.CHARGE_ABOVE if surplus_j > 0 else Mark.CHARGE_MISSED
+        charge = Mark.NOT_NEUTRAL if problem.end_min_j == problem.start_j else missed
+    return Status(charge, shortfall_steps(problem))
 
 
 def is_neutral(surplus_j: float, fuel_j: float) -> bool:
@@ -158,15 +155,9 @@ def is_neutral(surplus_j: float, fuel_j: float) -> bool:
     return 100 * abs(surplus_j) <= max(NEUTRAL_PERCENT * fuel_j, 100 * _ROUNDING_J)
 
 
-def marked(status: str) -> str:
+def marked(status: Status) -> str:
     """What to add to the name of a row that others are compared with: nothing, or its marks."""
-    return "" if status == "ok" else f", itself marked {status}"
-
-
-def shortfall_marks(problem: Problem) -> list[str]:
-    """What a status says of steps driven with less than the cycle asks; empty where there are none."""
-    count = shortfall_steps(problem)
-    return [f"shortfall at {count} step{'s' if count > 1 else ''}"] if count else []
+    return "" if status.ok else f", itself marked {status}"
 
 
 def shortfall_steps(problem: Problem) -> int:

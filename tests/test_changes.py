@@ -66,7 +66,7 @@ def test_an_asked_end_charge_is_reached_by_the_optimum_and_judged_for_all():
         assert after.gap_percent >= 0
         off = after.soc_end - 0.5
         missed = "end charge above" if off > 0 else "end charge missed"
-        assert after.status == ("ok" if abs(off) < 0.01 else missed)
+        assert str(after.status) == ("ok" if abs(off) < 0.01 else missed)
     optimum = plug_in[-1]
     assert 0.5 <= optimum.soc_end < 0.501 and optimum.gap_percent < 0.2
 

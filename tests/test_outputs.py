@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from hevopt import DataError, build_problem, load_architecture, load_cycle, outputs, simulate, solve
 from hevopt.rows import Row
+from hevopt.status import OK, Status
 from hevopt.study import Comparison
 
 SHORT = "time_s,speed_kmh\n0,0\n5,0\n15,40\n40,40\n50,0\n60,0\n70,50\n110,50\n125,0\n130,0\n"
@@ -121,7 +122,7 @@ def test_any_number_is_written_to_its_last_bit_and_what_is_none_is_empty(
     tmp_path_factory, suffix, values
 ):
     path = tmp_path_factory.getbasetemp() / f"numbers{suffix}"
-    comparison = Comparison("c", [Row("A", "dp", "ok")])
+    comparison = Comparison("c", [Row("A", "dp", OK)])
     columns = {"time_s": list(range(len(values))), "value_w": np.array(values)}
     outputs.write_steps(path, comparison, columns, ABOUT)
     for line, value in zip(read(path), values, strict=True):
@@ -132,7 +133,7 @@ def test_any_number_is_written_to_its_last_bit_and_what_is_none_is_empty(
 
 
 def test_rows_of_failed_cases_have_empty_cells(tmp_path):
-    rows = [Row("A", "dp", "failed: too steep"), Row("A", "ecms", "ok", 4.5, engine_starts=3)]
+    rows = [Row("A", "dp", Status(failure="too steep")), Row("A", "ecms", OK, 4.5, engine_starts=3)]
     for suffix in outputs.SUFFIXES:
         path = tmp_path / f"rows{suffix}"
         outputs.write_rows(path, Comparison("c", rows), ABOUT)
@@ -142,7 +143,7 @@ def test_rows_of_failed_cases_have_empty_cells(tmp_path):
 
 
 def test_drives_with_different_columns_are_joined_with_gaps():
-    first, second = Row("A", "dp", "ok"), Row("B", "dp", "ok")
+    first, second = Row("A", "dp", OK), Row("B", "dp", OK)
     table = outputs.joined([(first, {"time_s": [0, 1], "x_w": [1, 2]}), (second, {"time_s": [0]})])
     assert table == {
         "architecture": ["A", "A", "B"], "strategy": ["dp"] * 3, "time_s": [0, 1, 0], "x_w": [1, 2, None],

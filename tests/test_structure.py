@@ -41,7 +41,7 @@ LAYERS = [
     ["powertrain", "provenance"],
     ["strategies"],
     ["certificate"],
-    ["case", "pareto"],
+    ["case", "pareto", "status"],
     ["rows"],
     ["study"],
     ["study_file", "outputs"],

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 from hevopt.pages.page import fixed
 from hevopt.pages.results import CarFigures, Results, RowFigures
 from hevopt.pages.verdict import is_nothing
+from hevopt.status import Mark
 
 LOOSE_PERCENT = 0.2
 _STEPS_LISTED = 5
-# What the marks of a status say of the charge at the end.
+# What the marks say of the charge at the end.
 _CHARGES = {
-    "not neutral": "stored energy changes",
-    "end charge missed": "the charge asked at the end is missed",
-    "end charge above": "the charge at the end is above that asked",
+    Mark.NOT_NEUTRAL: "stored energy changes",
+    Mark.CHARGE_MISSED: "the charge asked at the end is missed",
+    Mark.CHARGE_ABOVE: "the charge at the end is above that asked",
 }
 
 
@@ -61,30 +62,21 @@ def _missing(name: str, car: CarFigures) -> str | None:
 
 def _neutral(results: Results) -> Alert:
     lines = [
-        f"{row.architecture} {row.strategy}: {_charge(row, mark)}."
+        f"{row.architecture} {row.strategy}: {said}."
         for row in (row.figures for row in results.rows)
-        for mark in _charge_marks(row.status)
+        for said in ([_charge(row)] if row.status.charge else []) + list(row.status.others)
     ]
     asked = "the charge asked" if results.end_asked else "the charge it started with"
     nothing = f"Every row that was solved ends with {asked}, within 1 % of the fuel's energy."
     return Alert("Charge balance", bool(lines), lines or [nothing])
 
 
-def _charge_marks(status: str) -> list[str]:
-    """The marks of a status but those that other checks speak of."""
-    if status == "ok" or status.startswith("failed: "):
-        return []
-    return [mark for mark in status.split(", ") if not mark.startswith("shortfall")]
-
-
-def _charge(row: RowFigures, mark: str) -> str:
-    """What a mark says of the charge at the end."""
-    if mark not in _CHARGES:
-        return mark
+def _charge(row: RowFigures) -> str:
+    """What a row's mark says of the charge at the end."""
     share = "while no fuel is burnt"
     if row.delta_energy_percent is not None:
         share = f"by {fixed(row.delta_energy_percent, '+.2f')} % of the fuel's energy"
-    return f"{_CHARGES[mark]} {share}; compare the corrected figure"
+    return f"{_CHARGES[row.status.charge]} {share}; compare the corrected figure"
 
 
 def _limits(results: Results) -> Alert:

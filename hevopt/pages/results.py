@@ -5,11 +5,16 @@ Rows hold every figure at full precision; traces and maps are rounded, see `coll
 
 import gzip
 import json
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, InstanceOf, PlainSerializer
 
 from hevopt.datafile import FileModel
+from hevopt.status import Status
 
 FORMAT = "hevopt comparison 2"
+# Text in JSON.
+SavedStatus = Annotated[InstanceOf[Status], BeforeValidator(Status.read), PlainSerializer(str)]
 
 
 class RowFigures(FileModel):
@@ -17,7 +22,7 @@ class RowFigures(FileModel):
 
     architecture: str
     strategy: str
-    status: str
+    status: SavedStatus
     fuel_l_per_100km: float | None
     delta_fuel_percent: float | None
     co2_g_per_km: float | None

@@ -44,7 +44,7 @@ def _followed(sweep: Sweep) -> Alert:
         worst = int(np.argmax(figures.steps_short))
         steps = f"{figures.steps_short[worst]} step{'s' if figures.steps_short[worst] > 1 else ''}"
         count = int(figures.short.sum())
-        cases = sum(n for status, n in sweep.tally.marks.items() if "shortfall" in status)
+        cases = sum(n for status, n in sweep.tally.marks.items() if status.shortfall_steps)
         lines = [
             f"{count} of {len(figures.number)} designs do not follow the cycle ({cases} "
             f"case{'s' if cases > 1 else ''}): too weak, they drive on with what they have, on up to {steps} "
@@ -192,9 +192,8 @@ def _edge(key: str, values: list[Scalar], best: int) -> str | None:
 def _charge(sweep: Sweep) -> Alert:
     marks: Counter[str] = Counter()
     for status, count in sweep.tally.marks.items():
-        for mark in status.split(", "):
-            if "shortfall" not in mark:
-                marks[mark] += count
+        for mark in ([status.charge] if status.charge else []) + list(status.others):
+            marks[mark] += count
     lines = [
         f"{count} case{'s' if count > 1 else ''}: {mark}." for mark, count in marks.most_common()
     ]

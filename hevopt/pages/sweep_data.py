@@ -2,7 +2,6 @@
 
 import csv
 import io
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import printable
+from hevopt.status import OK, Status
 from hevopt.sweeps.export import csv_of
 from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
 from hevopt.sweeps.prune import Pruned
@@ -43,7 +43,7 @@ class Solved(NamedTuple):
     bound: float
     fuel: float
     nox: float
-    status: str
+    status: Status
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +102,7 @@ class Tally:
     counts: Counter[str] = field(default_factory=Counter)
     reasons: Reasons = field(default_factory=Reasons)
     failures: list[Record] = field(default_factory=list)
-    marks: Counter[str] = field(default_factory=Counter)
+    marks: Counter[Status] = field(default_factory=Counter)
     cycles: dict[str, None] = field(default_factory=dict)
     strategies: dict[str, None] = field(default_factory=dict)
     contradictions: int = 0
@@ -155,9 +155,9 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
         if record.strategy == BOUND:
             duals[place] = row["objective_bound_l_per_100km"]
             continue
-        short[record.design] = max(short[record.design], _steps_short(row["status"]))
         found = _solved(row)
-        best[place] = min(best.get(place, found), found)
+        short[record.design] = max(short[record.design], found.status.shortfall_steps)
+        best[place] = min(best.get(place, found), found, key=_order)
         tally.contradictions += found.bound > found.objective * (1 + _ROUNDING)
         nox_cost = found.objective - found.fuel
         if nox_cost > _SHARE_MIN * found.objective:
@@ -194,8 +194,8 @@ def _count(tally: Tally, record: Record) -> None:
         tally.reasons.add(record.outcome, record.error, record.design)
         if len(tally.failures) < FAILURES_LISTED:
             tally.failures.append(record)
-    if record.row is not None and record.row["status"] != "ok":
-        tally.marks[record.row["status"]] += 1
+    if record.row is not None and not (status := Status.read(record.row["status"])).ok:
+        tally.marks[status] += 1
 
 
 def _solved(row: Mapping[str, Any]) -> Solved:
@@ -205,14 +205,12 @@ def _solved(row: Mapping[str, Any]) -> Solved:
         row["objective_bound_l_per_100km"],
         row["fuel_corrected_l_per_100km"],
         nan if row.get("nox_mg_per_km") is None else row["nox_mg_per_km"],
-        row["status"],
+        Status.read(row["status"]),
     )
 
 
-def _steps_short(status: str) -> int:
-    """Steps on which a row with that status did not follow its cycle."""
-    found = re.search(r"shortfall(?: at (\d+) step)?", status)
-    return int(found[1] or 1) if found else 0
+def _order(solved: Solved) -> tuple:
+    return *solved[:-1], str(solved.status)
 
 
 def _bound_of(best: Solved | None, dual: float | None) -> float | None:
@@ -220,20 +218,26 @@ def _bound_of(best: Solved | None, dual: float | None) -> float | None:
     return dual if best is None else min(best.bound, best.objective)
 
 
-_NOTHING = Solved(nan, "", nan, nan, nan, "")
+class _Mean(NamedTuple):
+    """A design over the cycles: means, and the strategies and marks of all of them as text."""
+
+    objective: float = nan
+    fuel: float = nan
+    nox: float = nan
+    strategy: str = ""
+    status: str = ""
 
 
-def _mean_solved(solved: Sequence[Solved | None]) -> Solved:
+def _mean_solved(solved: Sequence[Solved | None]) -> _Mean:
     """A design's mean over the cycles; nothing where a cycle is not solved."""
     if None in solved:
-        return _NOTHING
-    return Solved(
+        return _Mean()
+    return _Mean(
         fsum(s.objective for s in solved) / len(solved),
-        ", ".join(dict.fromkeys(s.strategy for s in solved)),
-        fsum(s.bound for s in solved) / len(solved),
         fsum(s.fuel for s in solved) / len(solved),
         fsum(s.nox for s in solved) / len(solved),
-        "; ".join(dict.fromkeys(s.status for s in solved if s.status != "ok")) or "ok",
+        ", ".join(dict.fromkeys(s.strategy for s in solved)),
+        "; ".join(dict.fromkeys(str(s.status) for s in solved if not s.status.ok)) or str(OK),
     )
 
 

@@ -47,7 +47,7 @@ def best_rows(results: Results) -> list[RowFigures]:
     Rows without alerts, or, where there are none, any that were solved.
     """
     solved = [row.figures for row in results.rows if row.detail is not None]
-    rows = [row for row in solved if row.status == "ok"] or solved
+    rows = [row for row in solved if row.status.ok] or solved
     if not rows:
         return []
     near = (1 + _EQUAL_PERCENT / 100) * min(map(corrected_cost, rows))
@@ -77,7 +77,7 @@ def _first(results: Results, best: RowFigures, equal: list[RowFigures]) -> str:
         volume = f"{_VOLUME} as fuel volume"
     others = ", ".join(map(_name, equal))
     also = f" (equal within {_EQUAL_PERCENT:g}{_PERCENT}: {others})" if others else ""
-    doubt = "" if best.status == "ok" else "; no row is free of alerts, see below"
+    doubt = "" if best.status.ok else "; no row is free of alerts, see below"
     return (
         f"On {results.cycle}, {best.architecture} with {best.strategy} needs the least {what}{also}: "
         f"{corrected_cost(best):.4f}{volume}, charge-corrected ({_as_driven(results, best)})"

@@ -14,6 +14,8 @@ from itertools import count
 from math import fsum, inf, isfinite
 from typing import Any
 
+from hevopt.status import Status
+
 # Designs of one weight in a round, the last size for ever: few at first, so that an incumbent spares most of a
 # small study; later enough to keep some dozen workers busy, few enough to be few too many.
 WAVES = (4, 8, 16, 32)
@@ -65,7 +67,9 @@ def mean_objective(objectives: Sequence[Sequence[float | None]]) -> float | None
 
 def follows(rows: Iterable[Mapping[str, Any] | None]) -> bool:
     """Whether a design follows its cycles, by what rows of it there are: no step with less than the cycle asks."""
-    return not any("shortfall" in row.get("status", "") for row in rows if row is not None)
+    return not any(
+        Status.read(row.get("status", "ok")).shortfall_steps for row in rows if row is not None
+    )
 
 
 def search(designs: Iterable[Bounded], sizes: Sequence[int] = WAVES) -> Search:

@@ -18,7 +18,8 @@ from hevopt.files import find
 from hevopt.powertrain import build_problem
 from hevopt.prices import one_price_dual
 from hevopt.problem import Problem
-from hevopt.rows import Row, shortfall_marks
+from hevopt.rows import Row, shortfall_steps
+from hevopt.status import Status
 from hevopt.study import run_case
 from hevopt.sweeps.jobs import BOUND, FIGURES, Case, Job, Outcome, inputs_digest
 from hevopt.units import litres_per_100km
@@ -92,7 +93,7 @@ def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, A
     row = Row(
         car.name,
         BOUND,
-        ", ".join(shortfall_marks(problem)) or "ok",
+        Status(shortfall_steps=shortfall_steps(problem)),
         bound_l_per_100km=_litres(car, cycle, bound_kg),
         certificate=f"{proof}, {SCOPE}",
     )
