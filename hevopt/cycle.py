@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.errors import DataError
+from hevopt.errors import DataError, Fault
 from hevopt.files import find, printable, read_text, shipped_names, shown
 from hevopt.units import TO_SI
 
@@ -99,8 +99,8 @@ def cycle_of(path: Path, text: str) -> Cycle:
     return _cycle(path, text, refuse)
 
 
-def faults_in(path: Path) -> list[str]:
-    """`line 12: ...` for every faulty line of a cycle file, or else what is wrong with the whole of it."""
+def faults_in(path: Path) -> list[Fault | str]:
+    """Every faulty line of a cycle file, or else what is wrong with the whole of it."""
     faults: list[tuple[int, str]] = []
     text = read_text(path, _MEGABYTES_MAX)
     try:
@@ -110,8 +110,8 @@ def faults_in(path: Path) -> list[str]:
             _cycle(path, text, lambda *fault: faults.append(fault))
     except DataError as error:
         if not faults:
-            return [str(error).removeprefix(f"{path}, ").removeprefix(f"{path}: ")]
-    return [f"line {line}: {fault}" for line, fault in sorted(faults)]
+            return [str(error)]
+    return [Fault(f"{path}, line {line}", text) for line, text in sorted(faults)]
 
 
 def _cycle(path: Path, text: str, tell: _Tell) -> Cycle:

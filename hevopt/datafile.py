@@ -122,18 +122,13 @@ def checked(place: str, contents: dict[str, Any], model: type[Model]) -> Model:
         return model.model_validate(contents)
     except ValidationError:
         count, faults = faults_of(contents, model, _FAULTS_LISTED)
-    head = f"{place}: " if count == 1 else f"{place}: {count} faults\n  "
-    raise DataError(head + "\n  ".join(faults))
+    raise DataError.of(place, faults, count)
 
 
 def faults_of(contents: dict[str, Any], model: type[BaseModel], most: int) -> tuple[int, list[str]]:
-    """How many faults some contents have, and the first of them, each with key path, value and what is allowed.
-
-    Behind the first `most` stands how many more there are.
-    """
+    """How many faults some contents have, and the first of them, each with key path, value and what is allowed."""
     found = _all_faults(model, contents, ())
-    more = [f"and {len(found) - most} more"] if len(found) > most else []
-    return len(found), [_fault(model, fault) for fault in found[:most]] + more
+    return len(found), [_fault(model, fault) for fault in found[:most]]
 
 
 def good_keys(contents: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:

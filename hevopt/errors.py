@@ -9,6 +9,8 @@
 A message says where, what was found, what is allowed and what to do next.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 
@@ -17,11 +19,70 @@ class HevoptError(Exception):
 
     exit_status = 1
 
+    @property
+    def headline(self) -> str:
+        """The message in one line, without what it lists below."""
+        return (str(self).splitlines() or [""])[0].rstrip(":")
+
+    @property
+    def listed(self) -> list[str]:
+        """What is wrong, one by one, each with its place in front."""
+        return [str(self)]
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong. place: a file, with the key or line in it; text: what was found, what is allowed and
+    what to do."""
+
+    place: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.text}"
+
 
 class DataError(HevoptError):
-    """An input is missing, malformed or not physical."""
+    """An input is missing, malformed or not physical: one message, or a message made of faults of one place.
+
+    count: how many faults there are, where not all are given
+    """
 
     exit_status = 2
+
+    def __init__(self, message: str = "", faults: Sequence[Fault] = (), count: int = 0) -> None:
+        super().__init__(message, tuple(faults), max(count, len(faults)))
+
+    @classmethod
+    def of(cls, place: str, texts: Sequence[str], count: int = 0) -> "DataError":
+        """The error that lists faults of a place; count as above."""
+        return cls("", [Fault(place, text) for text in texts], count)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults that the message lists; none where it is a message of its own."""
+        return self.args[1]
+
+    @property
+    def listed(self) -> list[str]:
+        return [*map(str, self.faults), *self._more(f"{self._place}: ")] or [str(self)]
+
+    def __str__(self) -> str:
+        message, faults, count = self.args
+        if message or not faults:
+            return message
+        if count == 1:
+            return str(faults[0])
+        lines = [fault.text for fault in faults]
+        return "\n  ".join([f"{self._place}: {count} faults", *lines, *self._more("")])
+
+    @property
+    def _place(self) -> str:
+        return self.faults[0].place if self.faults else ""
+
+    def _more(self, place: str) -> list[str]:
+        left = self.args[2] - len(self.faults)
+        return [f"{place}and {left} more"] if left > 0 else []
 
 
 class UnknownNoxError(DataError):

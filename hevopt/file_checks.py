@@ -11,7 +11,7 @@ from typing import Any
 from hevopt.architecture import COMPONENTS, component_contents, load_architecture
 from hevopt.cycle import faults_in, load_cycle
 from hevopt.datafile import FileModel, faults_of, read_contents
-from hevopt.errors import DataError, HevoptError
+from hevopt.errors import DataError
 from hevopt.file_schema import MODELS
 from hevopt.files import read_text
 from hevopt.study_file import CompareFile
@@ -89,7 +89,7 @@ def architecture_faults(path: Path, contents: dict[str, Any], kind: str) -> tupl
             try:
                 part = component_contents(path, key, value, {})
             except DataError as error:
-                faults += lines_of(error)
+                faults += error.listed
                 continue
             faults += table_faults(part.place, part.contents, MODELS[key])
     if faults:
@@ -117,8 +117,10 @@ def cycle_finding(path: Path) -> Finding:
     found = faults_in(path)
     if found:
         left = len(found) - _LINES_LISTED
-        listed = found[:_LINES_LISTED] + ([f"and {left} more"] if left > 0 else [])
-        faults = [f"{path}{',' if f.startswith('line ') else ':'} {f}" for f in listed]
+        faults = [
+            *map(str, found[:_LINES_LISTED]),
+            *([f"{path}: and {left} more"] if left > 0 else []),
+        ]
         return Finding(path, CYCLE, "", faults, len(found))
     cycle = load_cycle(path.absolute())
     about = (
@@ -130,7 +132,8 @@ def cycle_finding(path: Path) -> Finding:
 
 def table_faults(place: str, contents: dict[str, Any], model: type[FileModel]) -> list[str]:
     """Faults of a table, each with `place` in front."""
-    return [f"{place}: {fault}" for fault in faults_of(contents, model, _KEYS_LISTED)[1]]
+    count, faults = faults_of(contents, model, _KEYS_LISTED)
+    return DataError.of(place, faults, count).listed if faults else []
 
 
 def tried(path: Path, key: str, read: Callable[[], object]) -> list[str]:
@@ -138,12 +141,5 @@ def tried(path: Path, key: str, read: Callable[[], object]) -> list[str]:
     try:
         read()
     except DataError as error:
-        return [f"{path}, {key}: {line}" for line in lines_of(error)]
+        return [f"{path}, {key}: {line}" for line in error.listed]
     return []
-
-
-def lines_of(error: HevoptError) -> list[str]:
-    """The faults that an error lists, each with the file in front."""
-    head, *faults = str(error).split("\n  ")
-    place = head.rpartition(": ")[0]
-    return [f"{place}: {fault}" for fault in faults] or [head]

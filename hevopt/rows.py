@@ -91,7 +91,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
 
 def failed_row(car: Architecture, strategy: str, error: HevoptError) -> Row:
     """The row of a strategy that has no figures."""
-    return Row(car.name, strategy, Status(failure=str(error).splitlines()[0].rstrip(":")))
+    return Row(car.name, strategy, Status(failure=error.headline))
 
 
 def against_reference(rows: list[Row]) -> tuple[list[Row], str | None]:

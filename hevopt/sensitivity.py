@@ -256,12 +256,8 @@ def _effect(trial: _Trial, given: Row, rows: Sequence[Row | HevoptError]) -> Eff
         [_change(value, given.nox_mg_per_km) for value in nox],
         _elasticity(trial.values, fuel),
         _elasticity(trial.values, nox),
-        [_first_line(row) if isinstance(row, HevoptError) else None for row in rows],
+        [row.headline if isinstance(row, HevoptError) else None for row in rows],
     )
-
-
-def _first_line(error: HevoptError) -> str:
-    return str(error).splitlines()[0].rstrip(":")
 
 
 def _change(value: float | None, base: float | None) -> float | None:

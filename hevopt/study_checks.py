@@ -15,7 +15,6 @@ from hevopt.file_checks import (
     cycle_finding,
     is_component,
     kind_and_contents,
-    lines_of,
     table_faults,
     tried,
 )
@@ -56,7 +55,7 @@ def compare_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[lis
     try:
         changes = changes_in(path, contents)
     except DataError as error:
-        faults += [f"{path}: {line}" for line in lines_of(error)]
+        faults += [f"{path}: {line}" for line in error.listed]
     else:
         in_set = _set_faults(path, changes, cars)
         faults += in_set
@@ -78,7 +77,7 @@ def _named_faults(study: Path, key: str, name: str, wanted: str) -> list[str]:
     try:
         path = find(folder, beside_study(study, name, suffix), suffix)
     except DataError as error:
-        return [f"{study}, {key}: {line}" for line in lines_of(error)]
+        return [f"{study}, {key}: {line}" for line in error.listed]
     try:
         if wanted == CYCLE and path.suffix.lower() != ".toml":
             return cycle_finding(path).faults
@@ -86,7 +85,7 @@ def _named_faults(study: Path, key: str, name: str, wanted: str) -> list[str]:
         if kind == wanted:
             return architecture_faults(path, contents, kind)[0]
     except HevoptError as error:
-        return lines_of(error)
+        return error.listed
     return [
         f"{study}, {key}: {printable(name)} is no {wanted} but of the kind {kind}; give the file of one"
     ]
@@ -97,7 +96,7 @@ def _settings_faults(path: Path, changes: Mapping[str, Any]) -> list[str]:
     try:
         settings = read_study(path)
     except DataError as error:
-        return lines_of(error)
+        return error.listed
     groups: dict[str, list[str]] = {}
     for name in KEYS.keys() & settings.given.keys():
         groups.setdefault(name.partition("_")[0], []).append(name)
@@ -146,7 +145,7 @@ def _part_faults(
     try:
         plain = component_contents(car, key, value, {}).contents
     except DataError as error:
-        return [f"{place}: {line}" for line in lines_of(error)]
+        return [f"{place}: {line}" for line in error.listed]
     table, faults = _changed(place, plain, changes, f"{key}.")
     return faults + table_faults(place, table, MODELS[key])
 
@@ -160,7 +159,7 @@ def _changed(
         try:
             table = with_changes(table, {key: value}, within)
         except DataError as error:
-            faults += [f"{place}: {line}" for line in lines_of(error)]
+            faults += [f"{place}: {line}" for line in error.listed]
     return table, faults
 
 

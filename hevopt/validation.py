@@ -17,7 +17,6 @@ from hevopt.file_checks import (
     cycle_finding,
     finding,
     kind_and_contents,
-    lines_of,
 )
 from hevopt.files import find, is_path, printable, shipped_names, shown
 from hevopt.study_checks import compare_faults, sweep_faults
@@ -38,11 +37,11 @@ def validate(name: str) -> Finding:
         if kind == CYCLE:
             return cycle_finding(path)
     except DataError as error:
-        return finding(Path(name), "file", "", lines_of(error))
+        return finding(Path(name), "file", "", error.listed)
     try:
         faults, about = _CHECKS.get(kind, component_faults)(path, contents, kind)
     except HevoptError as error:
-        faults, about = lines_of(error), ""
+        faults, about = error.listed, ""
     return finding(path, kind, about, list(dict.fromkeys(faults)))
 
 

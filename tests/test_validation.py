@@ -235,8 +235,7 @@ def test_a_cycle_has_faults_exactly_where_it_does_not_load(tmp_path_factory, lin
     try:
         load_cycle(path)
     except DataError as error:
-        said = str(error).removeprefix(str(path)).lstrip(",: ")
-        assert said in faults
+        assert str(error) in map(str, faults)
         assert len(faults) <= 8 * (len(lines) + 1)
     else:
         assert faults == []

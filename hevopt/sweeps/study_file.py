@@ -87,7 +87,8 @@ def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
     contents = read_contents(path)
     faults = _without_misplaced(contents)
     faults += _with_flat_parameters(contents)
-    faults += faults_of(contents, StudyFile, _MODEL_FAULTS)[1]
+    count, in_model = faults_of(contents, StudyFile, _MODEL_FAULTS)
+    faults += in_model + ([f"and {count - len(in_model)} more"] if count > len(in_model) else [])
     good, folder = good_keys(contents, StudyFile), path.parent
     parameters = _parameters(good.get("parameters", {}), "sample" in contents, faults)
     architecture, car = _car(folder, good.get("architecture"), faults)
@@ -125,9 +126,7 @@ def _raise(path: Path, faults: Sequence[str]) -> None:
     if len(faults) == 1:
         raise DataError(f"{path}, {faults[0]}")
     if faults:
-        more = len(faults) - _FAULTS_LISTED
-        listed = [*faults[:_FAULTS_LISTED], *([f"and {more} more"] if more > 0 else [])]
-        raise DataError(f"{path}: {len(faults)} faults\n  " + "\n  ".join(listed))
+        raise DataError.of(str(path), faults[:_FAULTS_LISTED], len(faults))
 
 
 def _without_misplaced(contents: dict[str, Any]) -> list[str]:
@@ -220,7 +219,7 @@ def _parameters(given: Mapping[str, Any], sampled: bool, faults: list[str]) -> d
         try:
             values = parameters[key] = values_of(key, value)
         except DataError as error:
-            faults.append(str(error).replace("\n  ", "; "))
+            faults += error.listed
             continue
         if not sampled and isinstance(values, Range) and values.count is None:
             faults.append(
