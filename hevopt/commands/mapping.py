@@ -27,7 +27,7 @@ _UnitOption = Annotated[
     list[str] | None,
     typer.Option("--unit", help="ROLE=UNIT: the unit of a column; may be repeated."),
 ]
-_SheetOption = Annotated[str | None, typer.Option("--sheet", help="Sheet of an .xlsx workbook.")]
+_SheetOption = Annotated[str | None, typer.Option("--sheet", help="Sheet of an Excel workbook.")]
 _LikeOption = Annotated[
     str | None,
     typer.Option("--like", help="Name or file of a component that gives the remaining keys."),
@@ -45,7 +45,9 @@ def _maps() -> None:
 
 @maps_app.command("import")
 def import_map(
-    file: Annotated[Path, typer.Argument(help="Table of the points, or a grid.")],
+    file: Annotated[
+        Path, typer.Argument(help="Table of the points, a grid, or a .mat file of axes and matrix.")
+    ],
     kind: Annotated[
         Literal["engine", "machine"], typer.Option("--kind", help="engine or machine.")
     ],
@@ -71,11 +73,19 @@ def import_map(
     unit: _UnitOption = None,
     rows: Annotated[
         Literal["speed", "torque"] | None,
-        typer.Option("--rows", help="What a grid's first column holds."),
+        typer.Option(
+            "--rows", help="What a grid's first column holds, or a square matrix's first index."
+        ),
     ] = None,
     sheet: _SheetOption = None,
 ) -> None:
-    """A component file, with what the map covers, from measured points of an engine or a machine."""
+    """A component file, with what the map covers, from measured points of an engine or a machine.
+
+    A MATLAB file holds vectors of speed and torque and a matrix over both. Data written as a program (.m) with
+    fc_map_spd, fc_map_trq, fc_fuel_map and fc_max_trq, or mc_map_spd, mc_map_trq, mc_eff_map and mc_max_trq: run it
+    in MATLAB or Octave, there save('map.mat', 'fc_map_spd', 'fc_map_trq', 'fc_fuel_map', 'fc_max_trq', '-v7'), and
+    import map.mat; a machine's file is its --full-load too.
+    """
     from hevopt.imports.component_text import component_text
     from hevopt.imports.figures import map_figure
     from hevopt.imports.map_engine import import_engine
@@ -205,7 +215,8 @@ def _request(
     values: dict[str, Any],
 ) -> "Request":
     from hevopt.imports.map_import import Request
-    from hevopt.imports.map_tables import ROLES, Source
+    from hevopt.imports.map_roles import ROLES
+    from hevopt.imports.map_tables import Source
 
     columns, units = pairs("--column", column, ROLES), pairs("--unit", unit, ROLES)
     others = {}
@@ -213,6 +224,7 @@ def _request(
         if text is not None:
             path, mark, of_sheet = (text, "", "") if Path(text).exists() else text.partition("#")
             own = {role: columns[role]} if role in columns else {}
+            own = columns if Path(path) == file else own
             of_sheet = of_sheet if mark else None
             others[role] = Source(Path(path), of_sheet, own, units, rows, extra=True)
     return Request(Source(file, sheet, columns, units, rows), others, like, values)

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
-from hevopt.imports.map_tables import VALUES_OF, Source, Table, curve_table, read_table
+from hevopt.imports.map_roles import VALUES_OF
+from hevopt.imports.map_tables import Source, Table, curve_table, read_table
 from hevopt.imports.measured import columns_found
 from hevopt.imports.measured_rows import runs
 from hevopt.units import RPM_PER_RADPS

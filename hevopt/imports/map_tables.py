@@ -1,15 +1,18 @@
 """Tables of a measured map in SI, by role of their columns: a row per point, or a grid with its axes as one."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import shown
+from hevopt.imports.map_matlab import curves_table, points_table
+from hevopt.imports.map_roles import ALIASES, POWERS, QUANTITIES, VALUES_OF
 from hevopt.imports.measured import (
     Column,
     Measured,
@@ -24,58 +27,6 @@ from hevopt.imports.measured_rows import runs
 
 Array = NDArray[np.float64]
 
-# role -> names without units that mean it, small letters and digits
-_ALIASES = {
-    "speed": {
-        "speed", "n", "enginespeed", "machinespeed", "motorspeed", "rotationalspeed", "rpm", "omega", "w", "neng",
-        "nengine", "nmot", "engspeed", "speedengine", "shaftspeed", "radps", "rads", "drehzahl",
-    },
-    "torque": {
-        "torque", "t", "m", "md", "tq", "trq", "enginetorque", "machinetorque", "motortorque", "braketorque",
-        "shafttorque", "engtorque", "nm", "load", "bmep", "pme", "mep", "brakemeaneffectivepressure",
-        "meaneffectivepressure", "drehmoment",
-    },
-    "fuel": {
-        "fuel", "fuelflow", "fuelrate", "fuelmassflow", "fuelconsumption", "fc", "mfuel", "mdotfuel", "fuelmass",
-        "consumption", "fuelconsumptionrate", "verbrauch",
-    },
-    "specific": {
-        "bsfc", "sfc", "be", "specificfuelconsumption", "brakespecificfuelconsumption", "specificconsumption",
-    },
-    "efficiency": {"efficiency", "eta", "eff", "brakethermalefficiency", "brakeefficiency", "bte"},
-    "nox": {"nox", "noxflow", "noxrate", "noxmassflow", "bsnox", "specificnox", "mnox", "noxemissions"},
-    "loss": {"loss", "losses", "powerloss", "losspower", "ploss", "totalloss", "totallosses"},
-    "electric": {"electricpower", "electricalpower", "pel", "pelec", "pelectric", "inverterpower", "dcpower"},
-    "full": {"fullload", "fullloadtorque", "maxtorque", "torquemax", "maximumtorque", "tfull"},
-    "motoring": {"motoring", "motoringtorque", "drag", "dragtorque", "frictiontorque", "tdrag", "motoringcurve"},
-}  # fmt: skip
-_QUANTITIES = {
-    "speed": ("rotation",),
-    "torque": ("torque", "pressure", "power"),
-    "fuel": ("mass flow", "specific consumption", "volume flow"),
-    "specific": ("specific consumption",),
-    "efficiency": ("fraction",),
-    "nox": ("mass flow", "specific consumption"),
-    "loss": ("power",),
-    "electric": ("power",),
-    "full": ("torque", "pressure", "power"),
-    "motoring": ("torque", "pressure", "power"),
-}
-# What a column of shaft power is called, read as its torque where no column holds that.
-_POWERS = {
-    "torque": {
-        "power", "pe", "brakepower", "enginepower", "machinepower", "motorpower", "shaftpower",
-        "mechanicalpower",
-    },
-    "full": {"fullloadpower", "maxpower", "powermax", "maximumpower"},
-    "motoring": {"motoringpower", "dragpower", "frictionpower"},
-}  # fmt: skip
-ROLES = tuple(_ALIASES)
-VALUES_OF = {
-    "fuel": ("fuel", "specific", "efficiency"),
-    "nox": ("nox",),
-    "loss": ("loss", "electric", "efficiency"),
-}
 _NUMBER = re.compile(r"[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?")
 
 
@@ -108,11 +59,11 @@ class Table:
 
 def read_table(source: Source, what: str) -> Table:
     """Speed, torque and every column that can give "fuel", "nox" or "loss"."""
-    measured = read_measured(source.path, sheet=source.sheet)
+    measured, is_matlab = _read(source, points_table, source.columns, source.rows)
     names = [column.name for column in measured.columns]
-    if len(names) > 2 and all(_NUMBER.fullmatch(name) for name in names[1:]):
+    if not is_matlab and len(names) > 2 and all(_NUMBER.fullmatch(name) for name in names[1:]):
         return _grid(measured, source, what)
-    if source.rows is not None and not source.extra:
+    if source.rows is not None and not source.extra and not is_matlab:
         raise DataError(
             f"{measured.path}: --rows is for a grid, and this table has a row per point; leave it out"
         )
@@ -123,7 +74,7 @@ def read_table(source: Source, what: str) -> Table:
 
 def curve_table(source: Source, role: str, *, plain: bool) -> Table | None:
     """Speed and torque of a curve; None where no column holds it. plain: one simply named torque will do."""
-    measured = read_measured(source.path, sheet=source.sheet)
+    measured, _ = _read(source, curves_table, source.columns, role)
     column = _column(measured, source, role)
     if column is None and plain:
         column = _needed(measured, source, "torque")
@@ -132,13 +83,25 @@ def curve_table(source: Source, role: str, *, plain: bool) -> Table | None:
     return _long(measured, source, {"speed": _needed(measured, source, "speed"), role: column})
 
 
+def _read(source: Source, layout: Callable, *terms: Any) -> tuple[Measured, bool]:
+    """The file's table, of a MATLAB file as a layout with some terms arranges it; whether it is one."""
+    arranged = []
+
+    def lay_out(path: Path, variables: Mapping[str, Any]) -> Any:
+        arranged.append(path)
+        return layout(path, variables, *terms)
+
+    measured = read_measured(source.path, sheet=source.sheet, matlab=lay_out)
+    return measured, bool(arranged)
+
+
 def _column(measured: Measured, source: Source, role: str) -> Column | None:
     if role in source.columns:
         return column_named(measured, source.columns[role])
     option = f"--column {role}=NAME"
-    column = column_of(measured, _ALIASES[role], option)
-    if column is None and role in _POWERS:
-        return column_of(measured, _POWERS[role], option)
+    column = column_of(measured, ALIASES[role], option)
+    if column is None and role in POWERS:
+        return column_of(measured, POWERS[role], option)
     return column
 
 
@@ -160,7 +123,7 @@ def _long(measured: Measured, source: Source, columns: Mapping[str, Column | Non
             continue
         own = source.extra and role in ("speed", "torque") and column.unit is not None
         unit = None if own else source.units.get(role)
-        found = in_si(measured, column, _QUANTITIES[role], f"--unit {role}=UNIT", unit)
+        found = in_si(measured, column, QUANTITIES[role], f"--unit {role}=UNIT", unit)
         values[role], kinds[role] = found.values, found.quantity
         notes.append(f"{role}: {found.note}")
     for role in ("speed", "torque"):
@@ -215,7 +178,7 @@ def _axes(measured: Measured, source: Source) -> tuple[str, str, dict[str, str |
     # A slash behind a bracket parts the axes; elsewhere it is one of a unit's, such as rad/s.
     parts = [part.strip() for part in re.split(r"\\|(?<=[\])])\s*/", corner)]
     named = [
-        next((r for r in ("speed", "torque") if base_of(p) in _ALIASES[r]), None) for p in parts
+        next((r for r in ("speed", "torque") if base_of(p) in ALIASES[r]), None) for p in parts
     ]
     units = {r: unit_in_name(p)[0] for r, p in zip(named, parts, strict=True) if r}
     down = source.rows or named[0]

@@ -1,10 +1,10 @@
 """Measured tables in whatever shape other tools wrote them: read into columns with units and line numbers.
 
-Text with any usual separator, decimal mark and encoding, .xlsx and .mat. A unit comes from the header, a units row,
-the name's suffix or the convention of a known tool; where none says it, whoever needs it must be told.
+Text with any usual separator, decimal mark and encoding, .xls, .xlsx and .mat. A unit comes from the header, a
+units row, the name's suffix or the convention of a known tool; where none says it, whoever needs it must be told.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -28,8 +28,13 @@ Array = NDArray[np.float64]
 
 _BYTES_MAX = 100_000_000
 _COLUMNS_NAMED = 30
+_OLD_WORKBOOK = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+_PROGRAM = (
+    "a program of MATLAB, which hevopt does not run; run it in MATLAB or Octave, and save what it made, such as "
+    "save('map.mat', 'fc_map_spd', 'fc_map_trq', 'fc_fuel_map', 'fc_max_trq', '-v7')"
+)
+MatlabLayout = Callable[[Path, dict[str, NDArray | None]], Table]
 _UNREADABLE = {
-    b"\xd0\xcf\x11\xe0": "an old .xls workbook; save it as .xlsx or CSV",
     b"%PDF": "a PDF; give the table as CSV or .xlsx",
     b"\x1f\x8b": "packed with gzip; unpack it first",
 }
@@ -79,12 +84,17 @@ class Quantity:
     note: str
 
 
-def read_measured(path: Path, *, sheet: str | None = None) -> Measured:
-    """The table of a CSV, TSV, .xlsx or .mat file; DataError where it has none that can be read."""
+def read_measured(
+    path: Path, *, sheet: str | None = None, matlab: MatlabLayout | None = None
+) -> Measured:
+    """The table of a CSV, TSV, Excel or .mat file; DataError where it has none that can be read.
+
+    matlab: how the variables of a .mat file become a table, else its vectors one column each
+    """
     shown_path = Path(printable(str(path)))
     contents = _contents(path, shown_path)
     try:
-        table = _table(shown_path, contents, sheet)
+        table = _table(shown_path, contents, sheet, matlab)
     except MemoryError:
         raise DataError(
             f"{shown_path}: too large for this machine's memory; shorten the file"
@@ -101,7 +111,7 @@ def _contents(path: Path, shown_path: Path) -> bytes:
         if not path.exists():
             raise DataError(f"{shown_path}: no such file; check the path")
         if not path.is_file():
-            raise DataError(f"{shown_path}: not a regular file; give a CSV, .xlsx or .mat file")
+            raise DataError(f"{shown_path}: not a regular file; give a CSV, Excel or .mat file")
         with path.open("rb") as file:
             contents = file.read(_BYTES_MAX + 1)
     except (OSError, ValueError) as error:
@@ -117,7 +127,7 @@ def _contents(path: Path, shown_path: Path) -> bytes:
     return contents
 
 
-def _table(path: Path, contents: bytes, sheet: str | None) -> Table:
+def _table(path: Path, contents: bytes, sheet: str | None, matlab: MatlabLayout | None) -> Table:
     for start, what in _UNREADABLE.items():
         if contents.startswith(start):
             raise DataError(f"{path}: {what}")
@@ -125,12 +135,18 @@ def _table(path: Path, contents: bytes, sheet: str | None) -> Table:
         from hevopt.imports.measured_excel import excel_table
 
         return excel_table(path, contents, sheet)
-    if sheet is not None:
-        raise DataError(f"{path}: not an .xlsx workbook; leave --sheet out")
-    if path.suffix.lower() == ".mat" or contents.startswith((b"MATLAB ", b"\x89HDF")):
-        from hevopt.imports.measured_matlab import matlab_table
+    if contents.startswith(_OLD_WORKBOOK):
+        from hevopt.imports.measured_xls import xls_table
 
-        return matlab_table(path, contents)
+        return xls_table(path, contents, sheet)
+    if sheet is not None:
+        raise DataError(f"{path}: not an Excel workbook; leave --sheet out")
+    if path.suffix.lower() == ".mat" or contents.startswith((b"MATLAB ", b"\x89HDF")):
+        from hevopt.imports.measured_matlab import columns_table, matlab_variables
+
+        return (matlab or columns_table)(path, matlab_variables(path, contents))
+    if path.suffix.lower() == ".m":
+        raise DataError(f"{path}: {_PROGRAM}")
     from hevopt.imports.measured_text import text_table
 
     return text_table(path, contents)

@@ -3,7 +3,7 @@
 import re
 import warnings
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import date, datetime, time, timedelta
 from functools import cache
 from io import BytesIO
@@ -15,8 +15,6 @@ from hevopt.files import printable
 from hevopt.imports.measured_rows import Row, Table, runs, table_of
 
 if TYPE_CHECKING:
-    from openpyxl.cell.read_only import ReadOnlyCell
-    from openpyxl.workbook import Workbook
     from openpyxl.worksheet._read_only import ReadOnlyWorksheet
 
 _UNPACKED_MAX = 200_000_000
@@ -39,13 +37,23 @@ def excel_table(path: Path, contents: bytes, sheet: str | None) -> Table:
                 "ignore"
             )  # of what hevopt does not read: styles, drawings, validations
             book = openpyxl.load_workbook(BytesIO(contents), read_only=True, data_only=True)
-            chosen, rows = _sheet_rows(path, book, sheet)
+            chosen, rows = chosen_rows(
+                path,
+                [s.title for s in book.worksheets],
+                lambda name: _rows_of(path, book[name]),
+                sheet,
+            )
     except (DataError, MemoryError):
         raise
     except Exception as error:  # the reader of a broken workbook raises whatever it stumbles over
         raise DataError(
             f"{path}: not a readable .xlsx workbook ({type(error).__name__}); save it again, or as CSV"
         ) from None
+    return sheet_table(path, chosen, rows)
+
+
+def sheet_table(path: Path, chosen: str, rows: list[Row]) -> Table:
+    """The table in the rows of a sheet with a name."""
     table = table_of(path, rows, padded=True)
     present = {number for number, _ in rows}
     blank = (
@@ -88,13 +96,15 @@ def _tags(archive: zipfile.ZipFile) -> int:
     return tags
 
 
-def _sheet_rows(path: Path, book: "Workbook", sheet: str | None) -> tuple[str, list[Row]]:
-    names = [s.title for s in book.worksheets]
+def chosen_rows(
+    path: Path, names: list[str], rows_of: Callable[[str], Iterator[Row]], sheet: str | None
+) -> tuple[str, list[Row]]:
+    """Name and rows of the sheet that is asked for, or of the only one that holds anything."""
     if sheet is not None:
         if sheet not in names:
             raise unknown_name(f"{path}: sheet", sheet, names)
-        return sheet, list(_rows_of(path, book[sheet]))
-    filled = {name: rows for name in names if (rows := list(_rows_of(path, book[name])))}
+        return sheet, list(rows_of(sheet))
+    filled = {name: rows for name in names if (rows := list(rows_of(name)))}
     if len(filled) != 1:
         found = (
             f"sheets {', '.join(map(repr, filled))}; choose one with --sheet"
@@ -107,24 +117,28 @@ def _sheet_rows(path: Path, book: "Workbook", sheet: str | None) -> tuple[str, l
 
 def _rows_of(path: Path, sheet: "ReadOnlyWorksheet") -> Iterator[Row]:
     sheet.reset_dimensions()  # what a file says of its own size may be wrong
+    rows = ([cell_text(c.value, c.number_format) for c in row] for row in sheet.iter_rows())
+    return filled_rows(path, sheet.title, rows)
+
+
+def filled_rows(path: Path, sheet: str, rows: Iterable[list[str]]) -> Iterator[Row]:
+    """Rows with anything in them, numbered from 1, without the empty cells at their ends."""
     cells_read = 0
-    for number, row in enumerate(sheet.iter_rows(), start=1):
-        cells_read += max(len(row), 1)
+    for number, cells in enumerate(rows, start=1):
+        cells_read += max(len(cells), 1)
         if cells_read > _SHEET_CELLS_MAX:
             raise DataError(
-                f"{path}, sheet {printable(sheet.title)!r}, row {number}: more than {_SHEET_CELLS_MAX} "
+                f"{path}, sheet {printable(sheet)!r}, row {number}: more than {_SHEET_CELLS_MAX} "
                 "cells; save the sheet as CSV, or keep fewer columns"
             )
-        cells = [_text(cell) for cell in row]
         while cells and not cells[-1]:
             cells.pop()
         if cells:
             yield number, cells
 
 
-def _text(cell: "ReadOnlyCell") -> str:
+def cell_text(value: object, number_format: str) -> str:
     """A cell as a text file would have it: durations as H:MM:SS, what is shown in per cent with its sign."""
-    value = cell.value
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -139,7 +153,7 @@ def _text(cell: "ReadOnlyCell") -> str:
         return _duration(value)
     if not isinstance(value, int | float):
         return str(value).strip()
-    if _in_percent(cell.number_format):
+    if _in_percent(number_format):
         return f"{value * 100:.15g}%"
     return repr(value).removesuffix(".0")
 

@@ -1,7 +1,8 @@
-"""MATLAB files of level 4 and 5 to tables: vectors, matrices and the fields of structures, numbers alone.
+"""MATLAB files to tables: vectors, matrices and the fields of structures, numbers alone.
 
-Read here, by the published description of the format, because a broken file must end in a message: readers in
-compiled code end with a crash. Every length is checked by slicing, which cannot reach outside the file.
+Levels 4 and 5 are read here, by the published description of the format, because a broken file must end in a
+message: readers in compiled code end with a crash (the one of version 7.3 works apart, measured_hdf5.py). Every
+length is checked by slicing, which cannot reach outside the file.
 """
 
 import struct
@@ -46,19 +47,17 @@ _BROKEN = (
 Variables = dict[str, NDArray | None]
 
 
-def matlab_table(path: Path, contents: bytes) -> Table:
-    """The vectors of equal length of a .mat file, one column each, with the columns of matrices."""
+def matlab_variables(path: Path, contents: bytes) -> Variables:
+    """The variables of a .mat file."""
     if contents.startswith((b"\x89HDF", b"MATLAB 7.3")):
-        raise DataError(
-            f"{path}: a .mat file of version 7.3 (HDF5), which hevopt does not read; save it with "
-            "save(..., '-v7'), or as CSV"
-        )
+        from hevopt.imports.measured_hdf5 import hdf5_variables
+
+        return hdf5_variables(path, contents)
     try:
         order = _BYTE_ORDERS.get(contents[126:128])
-        variables = _level_5(path, contents, order) if order else _level_4(contents)
+        return _level_5(path, contents, order) if order else _level_4(contents)
     except _BROKEN:
         raise DataError(f"{path}: not a readable .mat file; save it again, or as CSV") from None
-    return _matlab_columns(path, variables)
 
 
 def _level_5(path: Path, contents: bytes, order: str) -> Variables:
@@ -148,7 +147,8 @@ def _level_4(contents: bytes) -> Variables:
     return variables
 
 
-def _matlab_columns(path: Path, variables: Variables) -> Table:
+def columns_table(path: Path, variables: Variables) -> Table:
+    """The vectors of equal length, one column each, with the columns of matrices."""
     variables, arranging = arranged(path, variables)
     numeric = {n: v for n, v in variables.items() if v is not None and v.size > 1}
     if not numeric:
@@ -176,14 +176,15 @@ def _matlab_columns(path: Path, variables: Variables) -> Table:
         for i in range(array.shape[1]):
             names.append(cleaned(name) + (f"(:,{i + 1})" if array.shape[1] > 1 else ""))
             units.append(array_unit(name, array, i))
-            columns.append(_cells(array[:, i]))
+            columns.append(cells_of(array[:, i]))
     notes = ["MATLAB file, lines are row numbers", *arranging]
     if left_out:
         notes.append(f"left out, not of {rows} rows of numbers: {', '.join(left_out)}")
     return Table(names, units, columns, np.arange(1, rows + 1), notes, CONVENTION)
 
 
-def _cells(values: NDArray) -> Cells:
+def cells_of(values: NDArray) -> Cells:
+    """Numbers as a column's cells."""
     values = values.astype(float)
     strange = np.flatnonzero(np.abs(values) > LARGEST)
     texts = [(int(row), repr(float(values[row]))) for row in strange[:LISTED]]

@@ -2,9 +2,13 @@
 
 import io
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from fuzzing.seed import Seed, each_spoilt
+
+_WORKBOOKS = Path(__file__).parents[1] / "imports" / "workbooks"
 
 
 def measured() -> list[Seed]:
@@ -30,7 +34,9 @@ def _logs() -> list[Seed]:
     }  # fmt: skip
     pairs = zip(time.tolist(), (speed * 3.6).tolist(), strict=True)
     texts["log.xlsx"] = _workbook([["time [s]", "speed [km/h]"], *pairs])
-    texts["log.mat"] = _matlab({"cyc_mph": np.column_stack([time, speed / 0.44704])})
+    cycle = {"cyc_mph": np.column_stack([time, speed / 0.44704])}
+    texts |= {"log.mat": _matlab(cycle), "log73.mat": _matlab_73(cycle)}
+    texts["log.xls"] = (_WORKBOOKS / "drive.xls").read_bytes()
     return [
         Seed(name, text, ((*read, name, "--out", "o.csv"), (*read, name, "--repair", "--out", "o.csv")))
         for name, text in texts.items()
@@ -67,8 +73,15 @@ def _maps() -> list[Seed]:
                      (*read, "machine.csv", *machine_like, "--full-load", "full.csv")),
     ]  # fmt: skip
     columns = {"speed_rpm": rpm, "torque_nm": torque, "fuel_gps": fuel_gps}
+    axes = {
+        "fc_map_spd": rpm[:, 0] * np.pi / 30, "fc_map_trq": torque[0], "fc_fuel_map": fuel_gps,
+        "fc_max_trq": 250 - (rpm[:, 0] - 2400) ** 2 / 1e5,
+    }  # fmt: skip
     for name, contents in (
         ("map.mat", _matlab({key: values.ravel() for key, values in columns.items()})),
+        ("axes.mat", _matlab(axes)),
+        ("axes73.mat", _matlab_73(axes)),
+        ("map.xls", (_WORKBOOKS / "map.xls").read_bytes()),
         ("map.xlsx", _workbook([["speed [rpm]", "torque [Nm]", "fuel [g/s]"],
                                 *zip(*(v.ravel().tolist() for v in columns.values()), strict=True)])),
     ):  # fmt: skip
@@ -106,6 +119,19 @@ def _matlab(variables: dict[str, np.ndarray]) -> bytes:
     stream = io.BytesIO()
     savemat(stream, variables)
     return stream.getvalue()
+
+
+def _matlab_73(variables: dict[str, np.ndarray]) -> bytes:
+    """As MATLAB writes version 7.3: HDF5 behind a head of 512 bytes, axes the other way round."""
+    import h5py
+
+    with TemporaryDirectory(prefix="hevopt-fuzz-") as folder:
+        path = Path(folder) / "made.mat"
+        with h5py.File(path, "w", userblock_size=512) as file:
+            for name, values in variables.items():
+                made = file.create_dataset(name, data=np.atleast_2d(values).T)
+                made.attrs["MATLAB_class"] = np.bytes_("double")
+        return b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + path.read_bytes()[128:]
 
 
 def _coastdowns() -> list[Seed]:

@@ -182,7 +182,7 @@ def test_a_letters_case_that_tells_milli_from_mega_is_not_guessed():
         ("hello\nworld\n", "no row of numbers"),
         (b"t,v\n0,\0\n", "byte 6 is zero"),
         (b"\xff\xfe\0\0t", "UTF-32"),
-        (b"\xd0\xcf\x11\xe0....", ".xls"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1....", "not an .xls workbook that can be read"),
         (b"PK\x03\x04....", "not a readable .xlsx"),
         (b"t,v\n0,\x81\n", "byte 6 is not UTF-8 or Windows-1252"),
         ("a" * 2_000_000, "line 1: 2000000 characters"),
