@@ -24,10 +24,10 @@ from hevopt.demand import Demand, demand_of
 from hevopt.driver import change_down
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.frozen import frozen
+from hevopt.power_flows import PowerFlows, Way
 from hevopt.problem import Control, ControlTable, Problem, Reject, Signals, Trajectory
 from hevopt.rejects import bits, function_rejects, limit_rejects
 from hevopt.shortfall import shortfall_message
-from hevopt.transmission import output_torque_nm
 
 Array = NDArray[np.float64]
 Bits = NDArray[np.uint16]
@@ -39,15 +39,15 @@ _SHORTFALL_PASSES = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Branch:
-    """All controls of one joint; arrays (time, level), flows also (time, 1)."""
+    """All controls of one joint; arrays (time, level)."""
 
     joint: Joint
     labels: tuple[str, ...]
+    machine_nm: Array
     fuel_kg: Array
     nox_kg: Array
     battery_power_w: Array
     reject: Bits
-    flows: dict[str, Array]
 
 
 def build_problem(
@@ -178,8 +178,8 @@ def _branch(
     loss_w = machine_model.loss_w(
         architecture.machine, torques.machine, joint.machine_speed_radps[:, None]
     )
-    flows = _flows(architecture, demand, joint, torques, fuel_kgps, np.nan_to_num(loss_w))
-    battery_power_w = flows["machine_electric_w"] + architecture.vehicle.auxiliary_power_w
+    electric_w = torques.machine * joint.machine_speed_radps[:, None] + np.nan_to_num(loss_w)
+    battery_power_w = electric_w + architecture.vehicle.auxiliary_power_w
     # What an alternator that follows its load leaves to the battery is rounding, not charge.
     battery_power_w = np.where(np.abs(battery_power_w) < _ROUNDING_W, 0.0, battery_power_w)
     reject = (
@@ -192,58 +192,8 @@ def _branch(
         )
         | function_rejects(architecture, demand, joint, torques, battery_power_w)
     )
-    return _Branch(
-        joint, labels, fuel_kgps * step_s, nox_kgps * step_s, battery_power_w, reject, flows
-    )
-
-
-def _flows(
-    architecture: Architecture,
-    demand: Demand,
-    joint: Joint,
-    torques: Balance,
-    fuel_kgps: Array,
-    machine_loss_w: Array,
-) -> dict[str, Array]:
-    """Powers and losses. Clutch, gears, machine and brakes lose by laws of their own, so that the balances of
-    shafts and car are checks; the engine's loss is what fuel power is not turned into work."""
-    engine_speed = joint.engine_speed_radps[:, None]
-    machine_speed = joint.machine_speed_radps[:, None]
-    wheel_speed = demand.wheel_speed_radps[:, None]
-    ratio, efficiency = joint.gear_ratio[:, None], joint.gear_efficiency[:, None]
-    own = ~(joint.upstream | joint.shared)[:, None]
-    fuel_power = fuel_kgps * architecture.engine.heating_value_jpkg
-    machine_power = torques.machine * machine_speed
-    engine_inertia = architecture.engine.inertia_kgm2 * joint.engine_accel_radps2[:, None]
-    machine_inertia = architecture.machine.inertia_kgm2 * joint.machine_accel_radps2[:, None]
-    own_loss = _gear_loss_w(torques.machine_net * machine_speed, joint.machine_efficiency[:, None])
-    return {
-        "engine_torque_nm": torques.engine,
-        "engine_speed_radps": engine_speed,
-        "machine_torque_nm": torques.machine,
-        "machine_speed_radps": machine_speed,
-        "fuel_power_w": fuel_power,
-        "engine_loss_w": fuel_power - torques.engine * engine_speed,
-        "engine_inertia_w": engine_inertia * engine_speed,
-        "machine_electric_w": machine_power + machine_loss_w,
-        "machine_loss_w": machine_loss_w,
-        "machine_inertia_w": machine_inertia * machine_speed,
-        "machine_upstream": joint.upstream[:, None].astype(float),
-        "machine_shared": joint.shared[:, None].astype(float),
-        "clutch_in_w": torques.clutch * engine_speed,
-        "clutch_loss_w": torques.clutch * joint.slip_radps[:, None],
-        "gearbox_out_w": output_torque_nm(torques.gearbox_in, ratio, efficiency) * wheel_speed,
-        "gearbox_loss_w": _gear_loss_w(torques.gearbox_in * ratio * wheel_speed, efficiency),
-        "machine_gear_out_w": torques.wheel_own * wheel_speed,
-        "machine_gear_loss_w": np.where(own, own_loss, 0.0),
-        "brake_power_w": torques.brake * wheel_speed,
-        "wheel_power_w": demand.wheel_power_w[:, None],
-        "auxiliary_power_w": np.full((1, 1), architecture.vehicle.auxiliary_power_w),
-    }
-
-
-def _gear_loss_w(input_w: Array, efficiency: Array) -> Array:
-    return np.where(input_w > 0, input_w * (1 - efficiency), input_w * (1 - 1 / efficiency))
+    fuel_kg, nox_kg = fuel_kgps * step_s, nox_kgps * step_s
+    return _Branch(joint, labels, torques.machine, fuel_kg, nox_kg, battery_power_w, reject)
 
 
 def _assemble(
@@ -251,12 +201,7 @@ def _assemble(
 ) -> ControlTable:
     modes, switch_fuel_kg = _modes(architecture, branches)
     widths = [len(branch.labels) for branch in branches]
-    flows = {
-        name: frozen(
-            name, _joined([branch.flows[name] for branch in branches], widths, len(demand.time_s))
-        )
-        for name in branches[0].flows
-    }
+    ways = [Way(branch.joint, frozen("torque", branch.machine_nm)) for branch in branches]
     controls = tuple(
         Control(branch.joint.engine_on, branch.joint.machine_gear, label, branch.joint.engine_gear)
         for branch in branches
@@ -276,14 +221,8 @@ def _assemble(
         switch_allowed=np.ones(switch_fuel_kg.shape, dtype=bool),
         controls=controls,
         signals=Signals(demand.speed_mps, demand.wheel_power_w, demand.gear, demand.clutch_open),
-        flows=flows,
+        flows=PowerFlows(architecture, demand, tuple(ways)),
         missing_torque_nm=missing,
-    )
-
-
-def _joined(parts: list[Array], widths: list[int], steps: int) -> Array:
-    return np.hstack(
-        [np.broadcast_to(part, (steps, w)) for part, w in zip(parts, widths, strict=True)]
     )
 
 

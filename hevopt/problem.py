@@ -7,7 +7,6 @@ Axis order is (time, control). Power > 0 flows towards the wheels; battery power
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import IntFlag
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from hevopt.battery import Battery, energy_j, within_limits
 from hevopt.errors import DataError
+from hevopt.flows import Flows, GivenFlows
 from hevopt.frozen import frozen
 
 Array = NDArray[np.float64]
@@ -160,10 +160,8 @@ class ControlTable:
     def __post_init__(self) -> None:
         types = {"reject": np.uint16, "mode": np.int64, "switch_allowed": np.bool_}
         _freeze(self, types, "control table: ")
-        flows = {
-            name: frozen(f"control table: flows {name}", flow) for name, flow in self.flows.items()
-        }
-        object.__setattr__(self, "flows", MappingProxyType(flows))
+        if not isinstance(self.flows, Flows):
+            object.__setattr__(self, "flows", GivenFlows(self.flows, "control table: "))
         object.__setattr__(self, "controls", tuple(self.controls))
         self._check_shapes()
         self._check_values()
@@ -171,7 +169,9 @@ class ControlTable:
     def __reduce__(self) -> tuple:
         """Copies and pickles are made by the constructor, so that they cannot be changed either."""
         parts = {part.name: getattr(self, part.name) for part in fields(self)}
-        return type(self), tuple((parts | {"flows": dict(self.flows)}).values())
+        if isinstance(self.flows, GivenFlows):
+            parts["flows"] = dict(self.flows)
+        return type(self), tuple(parts.values())
 
     def _check_shapes(self) -> None:
         if self.fuel_kg.ndim != 2 or not self.fuel_kg.size:
@@ -193,7 +193,8 @@ class ControlTable:
             "missing_torque_nm": (steps,),
         }
         found = {name: getattr(self, name) for name in expected}
-        found |= {f"flows {name}": values for name, values in self.flows.items()}
+        if isinstance(self.flows, GivenFlows):
+            found |= {f"flows {name}": values for name, values in self.flows.items()}
         for part in fields(Signals) if self.signals is not None else ():
             name = f"signals.{part.name}"
             found[name], expected[name] = getattr(self.signals, part.name), (steps,)

@@ -42,7 +42,7 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     switch_kg = table.switch_fuel_kg[before, mode]
     fuel_kg = table.fuel_kg[steps, control] + switch_kg
     nox_kg = table.nox_kg[steps, control]
-    flows = {name: flow[steps, control] for name, flow in table.flows.items()}
+    flows = table.flows.along(control)
     flows |= _battery_flows(problem, energy_j, power_w)
     return Trajectory(
         control=control,

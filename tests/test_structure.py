@@ -19,7 +19,7 @@ LAYERS = [
     ["files", "frozen"],
     ["writing"],
     ["datafile", "cycle", "keypaths"],
-    ["_battery_kernels", "file_fields"],
+    ["_battery_kernels", "file_fields", "flows"],
     ["vehicle", "engine", "machine", "battery", "transmission"],
     [
         "architecture_file",
@@ -37,7 +37,7 @@ LAYERS = [
     ["driver", "choices"],
     ["couplings", "prices", "simulation", "_lower_dp_kernels"],
     ["balance", "step_prices", "shortfall"],
-    ["rejects", "lower_dp"],
+    ["rejects", "lower_dp", "power_flows"],
     ["powertrain", "provenance"],
     ["strategies"],
     ["certificate"],
