@@ -15,6 +15,7 @@ rounding could have added (prices.py, lower_dp.py) and then held against the pla
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import StrEnum
 from math import inf
 
 import numpy as np
@@ -26,11 +27,46 @@ from hevopt.problem import Problem, Trajectory
 from hevopt.step_prices import costate_dual, lp_dual
 
 TARGET_GAP = 5e-4
-# What every bound speaks of: the table's controls, not a continuous split between them.
-SCOPE = "tabulated controls"
 LOWER_DP_NODES = (16_001, 64_001)
 # Share of the window within which a rollout counts as touching its end.
 _TOUCH = 2e-3
+
+
+class Proof(StrEnum):
+    """How a bound was proven."""
+
+    ONE_MULTIPLIER = "one multiplier"
+    COSTATE_PRICES = "costate prices"
+    LP_PRICES = "LP prices"
+    LOWER_BOUND_DP = "lower-bound DP"
+
+
+class Scope(StrEnum):
+    """What a bound speaks of: the table's controls, not a continuous split between them."""
+
+    TABULATED = "tabulated controls"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What a bound is. Text of results saved by another version may name a proof that this one does not know."""
+
+    proof: Proof | str
+    scope: Scope | str = Scope.TABULATED
+
+    def __str__(self) -> str:
+        return f"{self.proof}, {self.scope}" if self.scope else str(self.proof)
+
+    @classmethod
+    def read(cls, text: object) -> "Claim":
+        """The claim that a saved text stands for; ValueError for what is no text."""
+        if not isinstance(text, str):
+            raise ValueError("not the certificate of a row")
+        proof, _, scope = text.partition(", ")
+        return cls(
+            Proof(proof) if proof in set(Proof) else proof,
+            Scope(scope) if scope in set(Scope) else scope,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +79,16 @@ class Certificate:
     """
 
     end_min_j: float
-    proofs: dict[str, list[Line]]
-    at_least: dict[str, float] = field(default_factory=dict)
-    failures: dict[str, str] = field(default_factory=dict)
+    proofs: dict[Proof, list[Line]]
+    at_least: dict[Proof, float] = field(default_factory=dict)
+    failures: dict[Proof, str] = field(default_factory=dict)
     end_slack_j: float = 0.0
 
-    def bound_kg(self, end_j: float) -> tuple[float, str]:
+    def bound_kg(self, end_j: float) -> tuple[float, Proof]:
         """The highest proven bound for plans that end with at least `end_j`, and its kind of proof."""
         return max(self._bounds(end_j))
 
-    def bound_of(self, plan: Trajectory) -> tuple[float, str]:
+    def bound_of(self, plan: Trajectory) -> tuple[float, Proof]:
         """The bound at a plan's own end charge and its kind of proof; at most the plan's cost, within rounding.
 
         Raises SolverError where a proof contradicts the plan.
@@ -68,7 +104,7 @@ class Certificate:
         bound, kind = max(bounds)
         return min(bound, plan.cost_kg), kind
 
-    def _bounds(self, end_j: float) -> list[tuple[float, str]]:
+    def _bounds(self, end_j: float) -> list[tuple[float, Proof]]:
         extra_j = end_j - self.end_min_j
         rounding_j = 4 * EPSILON * (abs(end_j) + abs(self.end_min_j))
         bounds = [
@@ -96,28 +132,28 @@ def certify(
     """
     lines = one_price_dual(problem)
     certificate = Certificate(
-        problem.end_min_j, {"one multiplier": lines}, end_slack_j=end_slack_j(problem)
+        problem.end_min_j, {Proof.ONE_MULTIPLIER: lines}, end_slack_j=end_slack_j(problem)
     )
     if rollout is None:
         return certificate
     worth = certificate.price_kgpj
     _gap(certificate, rollout)
-    _try_prices(certificate, "costate prices", lambda: costate_dual(problem, rollout))
+    _try_prices(certificate, Proof.COSTATE_PRICES, lambda: costate_dual(problem, rollout))
     gap = _gap(certificate, rollout)
     if gap > target_gap and _touches_window(problem, rollout):
-        _try_prices(certificate, "LP prices", lambda: lp_dual(problem, rollout))
+        _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout))
         gap = _gap(certificate, rollout)
     for nodes in LOWER_DP_NODES:
         if gap <= target_gap:
             break
-        best = certificate.at_least.get("lower-bound DP", -inf)
+        best = certificate.at_least.get(Proof.LOWER_BOUND_DP, -inf)
         bound = lower_bound_kg(problem, worth, nodes=nodes)
-        certificate.at_least["lower-bound DP"] = max(best, bound)
+        certificate.at_least[Proof.LOWER_BOUND_DP] = max(best, bound)
         gap = _gap(certificate, rollout)
     return certificate
 
 
-def _try_prices(certificate: Certificate, kind: str, lines: Callable[[], list[Line]]) -> None:
+def _try_prices(certificate: Certificate, kind: Proof, lines: Callable[[], list[Line]]) -> None:
     """Add a rung; without its prices there is no proof of the kind, and the next one needs none."""
     try:
         certificate.proofs[kind] = lines()

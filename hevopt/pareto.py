@@ -22,7 +22,7 @@ from math import isfinite
 from typing import Any
 
 from hevopt.architecture import Architecture
-from hevopt.certificate import certify
+from hevopt.certificate import Proof, certify
 from hevopt.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.problem import Plan, Problem
@@ -46,7 +46,7 @@ class HalfPlane:
 
     nox_weight: float
     bound_kg: float
-    proof: str
+    proof: Proof
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +276,7 @@ def figures_of(found: Front, car: Architecture, cycle: Cycle, strategy: str) -> 
                 "nox_mg_per_km": milligrams(point.nox_kg),
                 "bound_l_per_100km": litres(plane.bound_kg),
                 "gap_percent": 100 * max(excess_kg, 0.0) / plane.bound_kg if known else None,
-                "certificate": plane.proof,
+                "certificate": str(plane.proof),
             }
         )
     return {

@@ -89,7 +89,7 @@ def _cells(row: Row) -> list[str]:
         "-" if row.engine_starts is None else str(row.engine_starts),
         number(row.bound_l_per_100km, ".3f"),
         number(row.gap_percent, ".3f"),
-        (row.certificate or "-").split(",")[0],
+        "-" if row.certificate is None else str(row.certificate.proof),
         number(row.solve_s, ".2f"),
         str(row.status),
     ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 
 from hevopt.architecture import Architecture
 from hevopt.case import Case
-from hevopt.certificate import SCOPE
+from hevopt.certificate import Claim
 from hevopt.errors import HevoptError
 from hevopt.files import printable
 from hevopt.problem import Problem, Trajectory
@@ -46,7 +46,7 @@ class Row:
     engine_starts: int | None = None
     bound_l_per_100km: float | None = None
     gap_percent: float | None = None
-    certificate: str | None = None
+    certificate: Claim | None = None
     solve_s: float | None = None
 
     @property
@@ -55,8 +55,10 @@ class Row:
         return self.fuel_l_per_100km is not None
 
     def as_dict(self) -> dict:
-        """All fields by name, in order, as JSON has them: the status as text."""
-        return {f.name: getattr(self, f.name) for f in fields(self)} | {"status": str(self.status)}
+        """All fields by name, in order, as JSON has them: status and certificate as text."""
+        certificate = None if self.certificate is None else str(self.certificate)
+        texts = {"status": str(self.status), "certificate": certificate}
+        return {f.name: getattr(self, f.name) for f in fields(self)} | texts
 
 
 def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
@@ -84,7 +86,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
         engine_starts=engine_starts(problem, trajectory),
         bound_l_per_100km=litres(bound_kg),
         gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
-        certificate=f"{proof}, {SCOPE}",
+        certificate=Claim(proof),
         solve_s=solve_s,
     )
 

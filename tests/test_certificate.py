@@ -8,10 +8,11 @@ from conftest import CYCLES, HYBRIDS
 from problems import every_plan, random_problem
 
 from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
-from hevopt.certificate import TARGET_GAP
+from hevopt.certificate import TARGET_GAP, Claim, Proof, Scope
 from hevopt.lower_dp import lower_bound_kg
 from hevopt.prices import one_price_dual
 from hevopt.step_prices import costate_dual, dual_of_shape, lp_dual
+from hevopt.strategies import dp
 
 ROUNDING = 1 + 1e-12
 
@@ -101,3 +102,18 @@ def test_finer_lower_bound_dp_proves_more(problem_of):
     bounds = [lower_bound_kg(problem, worth, nodes=n) for n in (1001, 4001, 16001)]
     assert bounds == sorted(bounds)
     assert bounds[-1] <= simulate(problem, solve(problem).control).cost_kg
+
+
+def test_what_a_bound_is_travels_as_a_type_and_its_text_reads_back(problem_of):
+    problem = problem_of("A", "hwfet")
+    rollout = simulate(problem, dp.solve(problem).control)
+    _, proof = certify(problem, rollout).bound_of(rollout)
+    assert isinstance(proof, Proof)
+    for kind in Proof:
+        assert str(Claim(kind)) == f"{kind.value}, tabulated controls"
+        assert Claim.read(str(Claim(kind))) == Claim(kind, Scope.TABULATED)
+    # Saved by another version: kept as it is.
+    assert Claim.read("two prices, some controls") == Claim("two prices", "some controls")
+    assert str(Claim.read("two prices")) == "two prices"
+    with pytest.raises(ValueError, match="not the certificate"):
+        Claim.read(None)

@@ -198,11 +198,10 @@ def _value(table: Table, role: str, what: str, torque_nm: Array, facts: EngineFa
             table, facts.fuel_density_kgpm3, "a volume flow", "fuel.density_kgpl"
         )
     if (values > 1).any():
-        read = next(note for note in table.notes if note.startswith("efficiency: "))
         raise DataError(
             f"{table.measured.path}, {_places(table, values > 1)}: efficiency up to {np.nanmax(values):g}; "
-            f"allowed: up to 1, which is 100 %; read as {read}; correct the cells, or give the unit in the header "
-            "or with --unit efficiency=UNIT"
+            f"allowed: up to 1, which is 100 %; read as {table.read['efficiency']}; "
+            "correct the cells, or give the unit in the header or with --unit efficiency=UNIT"
         )
     efficiency = np.where(values > 0, values, np.nan)
     if what == "loss":

@@ -47,11 +47,15 @@ class Source:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Rows of speed, torque and value columns, each (row,) in SI, by role; kinds: role -> quantity measured."""
+    """Rows of speed, torque and value columns, each (row,) in SI, by role.
+
+    kinds, read: role -> quantity measured, and how its column was read
+    """
 
     measured: Measured
     values: Mapping[str, Array]
     kinds: Mapping[str, str]
+    read: Mapping[str, str]
     lines: NDArray[np.int64]
     rectangular: bool
     notes: tuple[str, ...]
@@ -117,7 +121,7 @@ def _needed(measured: Measured, source: Source, role: str) -> Column:
 
 
 def _long(measured: Measured, source: Source, columns: Mapping[str, Column | None]) -> Table:
-    values, kinds, notes = {}, {}, [*measured.notes]
+    values, kinds, read = {}, {}, {}
     for role, column in columns.items():
         if column is None:
             continue
@@ -125,7 +129,7 @@ def _long(measured: Measured, source: Source, columns: Mapping[str, Column | Non
         unit = None if own else source.units.get(role)
         found = in_si(measured, column, QUANTITIES[role], f"--unit {role}=UNIT", unit)
         values[role], kinds[role] = found.values, found.quantity
-        notes.append(f"{role}: {found.note}")
+        read[role] = f"{role}: {found.note}"
     for role in ("speed", "torque"):
         empty = ~np.isfinite(values[role]) if role in values else np.zeros(0, dtype=bool)
         if empty.any():
@@ -133,7 +137,8 @@ def _long(measured: Measured, source: Source, columns: Mapping[str, Column | Non
                 f"{measured.path}, {runs(list(measured.lines[empty]))}: no {role}; fill the cells or delete "
                 "the rows"
             )
-    return Table(measured, values, kinds, measured.lines, False, tuple(notes))
+    notes = (*measured.notes, *read.values())
+    return Table(measured, values, kinds, read, measured.lines, False, notes)
 
 
 def _grid(measured: Measured, source: Source, what: str) -> Table:
@@ -169,7 +174,7 @@ def _grid(measured: Measured, source: Source, what: str) -> Table:
             "a row per point"
         )
     notes = (*table.notes, f"grid: {rows} rows of {down}, {len(head)} columns of {across}")
-    return Table(measured, table.values, table.kinds, lines, True, notes)
+    return Table(measured, table.values, table.kinds, table.read, lines, True, notes)
 
 
 def _axes(measured: Measured, source: Source) -> tuple[str, str, dict[str, str | None]]:

@@ -65,7 +65,7 @@ def _figures(row: Row) -> dict[str, Any]:
         derived["co2_corrected_g_per_km"] = figures.co2_g_per_km * share
     if figures.soc_end is not None:
         derived["delta_soc"] = figures.soc_end - figures.soc_start
-    proof = (figures.certificate or "").split(",")[0]
+    proof = "" if figures.certificate is None else str(figures.certificate.proof)
     return figures.model_dump() | derived | {"proof": proof, "solved": row.detail is not None}
 
 

@@ -9,12 +9,14 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, InstanceOf, PlainSerializer
 
+from hevopt.certificate import Claim
 from hevopt.datafile import FileModel
 from hevopt.status import Status
 
 FORMAT = "hevopt comparison 2"
 # Text in JSON.
 SavedStatus = Annotated[InstanceOf[Status], BeforeValidator(Status.read), PlainSerializer(str)]
+SavedClaim = Annotated[InstanceOf[Claim], BeforeValidator(Claim.read), PlainSerializer(str)]
 
 
 class RowFigures(FileModel):
@@ -35,7 +37,7 @@ class RowFigures(FileModel):
     engine_starts: int | None
     bound_l_per_100km: float | None
     gap_percent: float | None
-    certificate: str | None
+    certificate: SavedClaim | None
     solve_s: float | None
 
 

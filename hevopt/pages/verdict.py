@@ -127,7 +127,7 @@ def _second(results: Results, best: RowFigures) -> str:
         if is_nothing(best):
             return "It cannot be lower: nothing is burnt, and 0 is the bound."
         return "The proven lower bound is 0: how close to it the row could come is not known."
-    proof = (best.certificate or "").split(",")[0]
+    proof = "" if best.certificate is None else best.certificate.proof
     sum_of = " of that sum" if results.nox_weight else ""
     return (
         f"As driven it lies {max(best.gap_percent, 0.0):.3f}{_PERCENT} above a proven lower bound ({proof}): no "

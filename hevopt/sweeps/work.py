@@ -11,7 +11,7 @@ from typing import Any
 from hevopt.architecture import Architecture, load_architecture
 from hevopt.case import Case as SolvedCase
 from hevopt.case import dp_case, require_nox
-from hevopt.certificate import SCOPE, Certificate
+from hevopt.certificate import Certificate, Claim, Proof
 from hevopt.cycle import Cycle, load_cycle
 from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
 from hevopt.files import find
@@ -24,7 +24,6 @@ from hevopt.study import run_case
 from hevopt.sweeps.jobs import BOUND, FIGURES, Case, Job, Outcome, inputs_digest
 from hevopt.units import litres_per_100km
 
-_ONE_MULTIPLIER = "one multiplier"
 # Proofs that cost more than a design's solution are tried only above this gap, four times that of a comparison.
 _TARGET_GAP = 2e-3
 
@@ -88,14 +87,14 @@ class _Bench:
 
 def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, Any]:
     """The certified dual alone: what no plan that ends with the asked charge can undercut."""
-    certificate = Certificate(problem.end_min_j, {_ONE_MULTIPLIER: one_price_dual(problem)})
+    certificate = Certificate(problem.end_min_j, {Proof.ONE_MULTIPLIER: one_price_dual(problem)})
     bound_kg, proof = certificate.bound_kg(problem.end_min_j)
     row = Row(
         car.name,
         BOUND,
         Status(shortfall_steps=shortfall_steps(problem)),
         bound_l_per_100km=_litres(car, cycle, bound_kg),
-        certificate=f"{proof}, {SCOPE}",
+        certificate=Claim(proof),
     )
     return _stored(row, None, row.bound_l_per_100km)
 
