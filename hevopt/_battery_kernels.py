@@ -122,10 +122,10 @@ def states(energy, battery):
 
 @compiled()
 def source_powers(power, voltage, resistance):
-    """(n,) Uoc I of many powers, each at its own voltage and resistance."""
-    result = np.empty(len(power))
+    """(2, n) Uoc I and root of many powers, each at its own voltage and resistance."""
+    result = np.empty((2, len(power)))
     for n in range(len(power)):
-        result[n], _ = source_power(power[n], voltage[n], resistance[n])
+        result[0, n], result[1, n] = source_power(power[n], voltage[n], resistance[n])
     return result
 
 

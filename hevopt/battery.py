@@ -145,17 +145,20 @@ def states(battery: Battery, energy: float | Array) -> Array:
 
 
 def source_power_w(power_w: Array, open_circuit_v: Array | float, ohm: Array | float) -> Array:
-    """Uoc I, of which the terminals get P and R I² is lost; NaN beyond what the voltage can deliver."""
+    """(2, ...) Uoc I, of which the terminals get P and R I² is lost, and the root Uoc - 2 R I.
+
+    NaN beyond what the voltage can deliver.
+    """
     parts = np.broadcast_arrays(power_w, open_circuit_v, ohm)
     flat = kernels.source_powers(*(np.ravel(part).astype(np.float64) for part in parts))
-    return flat.reshape(parts[0].shape)
+    return flat.reshape(2, *parts[0].shape)
 
 
 def chemical_power_w(
     battery: Battery, power_w: Array, open_circuit_v: Array | float, resistance_ohm: Array | float
 ) -> Array:
     """Rate at which stored energy falls for a terminal power; NaN beyond what the voltage can deliver."""
-    chemical = source_power_w(power_w, open_circuit_v, resistance_ohm)
+    chemical, _ = source_power_w(power_w, open_circuit_v, resistance_ohm)
     return np.where(power_w < 0, battery.coulombic_efficiency * chemical, chemical)
 
 

@@ -42,9 +42,13 @@ def check_table_file(path: Path) -> None:
 
 
 def result(comparison: Comparison, about: Mapping[str, Any]) -> dict[str, Any]:
-    """{"cycle", "rows"} and what the rows come from; None where a figure does not exist."""
+    """{"cycle", "rows"} and what the rows come from; None where a figure does not exist.
+
+    "lost_proofs" is there where a proof was tried and not found, see `Comparison`.
+    """
     rows = [row.as_dict() for row in comparison.rows]
-    return {"cycle": comparison.cycle, "rows": rows, **about}
+    lost = {"lost_proofs": dict(comparison.lost_proofs)} if comparison.lost_proofs else {}
+    return {"cycle": comparison.cycle, "rows": rows, **lost, **about}
 
 
 def result_json(comparison: Comparison, about: Mapping[str, Any]) -> str:

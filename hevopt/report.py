@@ -110,6 +110,7 @@ def comparison_notes(comparison: Comparison) -> str:
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
         "lower-bound DP = a cost-to-go nowhere above the true one."
         f"{_nox_note(comparison)}"
+        f"{_lost_note(comparison)}"
     )
 
 
@@ -131,6 +132,11 @@ def _end_notes(comparison: Comparison) -> str:
         "electricity drawn from the battery down to it (or stored up to it) is not counted as fuel, nor in "
         "vs ref.\n"
     )
+
+
+def _lost_note(comparison: Comparison) -> str:
+    lost = comparison.lost_proofs.items()
+    return "".join(f"\nproof not found: {printable(f'{which}: {why}')}" for which, why in lost)
 
 
 def _nox_note(comparison: Comparison) -> str:

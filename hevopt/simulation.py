@@ -126,7 +126,7 @@ def _battery_flows(problem: Problem, energy_j: Array, power_w: Array) -> dict[st
     pack = problem.battery
     _, voltage, discharge, charge = battery_model.states(pack, energy_j[:-1])
     resistance = np.where(power_w < 0, charge, discharge)
-    current = battery_model.source_power_w(power_w, voltage, resistance) / voltage
+    current = battery_model.source_power_w(power_w, voltage, resistance)[0] / voltage
     coulombic = (1 - pack.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
     return {
         "battery_chemical_w": -np.diff(energy_j) / problem.table.step_s,

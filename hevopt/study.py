@@ -35,6 +35,7 @@ class Comparison:
 
     reference: the row that changes are against, None where there are none
     end_asked: car -> state of charge asked at the end, of those where it is another than the start's
+    lost_proofs: architecture and kind of proof -> why it was tried and not found
     """
 
     cycle: str
@@ -44,6 +45,7 @@ class Comparison:
     reference: str | None = None
     free_gear: bool = False
     end_asked: Mapping[str, float] = field(default_factory=dict)
+    lost_proofs: Mapping[str, str] = field(default_factory=dict)
 
 
 def solve(problem: Problem, strategy: str = "dp", **settings: Any) -> Plan:
@@ -86,6 +88,7 @@ def compare(
     total = sum(len(names) for _, names in plans)
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
+    lost: dict[str, str] = {}
     for car, wanted in plans:
         done = len(rows)
         progress(f"{car.name}: table and certificate", done, total)
@@ -101,6 +104,7 @@ def compare(
             failures[car.name] = error
             rows += [failed_row(car, name, error) for name in wanted]
             continue
+        lost |= lost_proofs(case)
         for n, name in enumerate(wanted):
             progress(f"{car.name}: {name}", done + n, total)
             try:
@@ -116,7 +120,13 @@ def compare(
             raise unknown[0]
     rows, reference = against_reference(rows)
     asked = end_asked(car for car, _ in plans)
-    return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear, asked)
+    return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear, asked, lost)
+
+
+def lost_proofs(case: Case) -> dict[str, str]:
+    """Architecture and kind of proof -> why a proof was tried on a case and not found."""
+    failures = case.certificate.failures.items()
+    return {f"{case.car.name}, {kind}": message for kind, message in failures}
 
 
 def end_asked(cars: Iterable[Architecture]) -> dict[str, float]:

@@ -185,3 +185,21 @@ def test_the_same_run_writes_the_same_bytes(hevopt):
     for name in ("a.csv", "b.csv"):
         assert hevopt(*words, name)[0] == 0
     assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
+
+
+def test_a_proof_that_was_not_found_is_named_in_json_and_below_the_table(hevopt, monkeypatch):
+    from hevopt import SolverError, certificate
+
+    def stopped(problem, rollout):
+        raise SolverError("HiGHS stopped with status 4")
+
+    words = ("run", "C2", "--cycle", "./short.csv")
+    assert "lost_proofs" not in json.loads(hevopt(*words, "--json").out)
+    monkeypatch.setattr(certificate, "costate_dual", stopped)
+    for command in (
+        words,
+        ("compare", "--architectures", "C2", "--strategies", "dp", "--cycle", "./short.csv"),
+    ):
+        lost = json.loads(hevopt(*command, "--json").out)["lost_proofs"]
+        assert lost == {"C2, costate prices": "HiGHS stopped with status 4"}
+    assert "proof not found: C2, costate prices: HiGHS stopped" in hevopt(*words).out

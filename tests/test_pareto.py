@@ -9,8 +9,18 @@ import pytest
 from command_line import call
 from problems import every_plan, random_problem
 
-from hevopt import Battery, ControlTable, DataError, InfeasibleError, Problem, simulate, solve
-from hevopt.pareto import GAP_ENOUGH, figures_of, front
+from hevopt import (
+    Battery,
+    ControlTable,
+    DataError,
+    InfeasibleError,
+    Problem,
+    load_architecture,
+    load_cycle,
+    simulate,
+    solve,
+)
+from hevopt.pareto import GAP_ENOUGH, Front, HalfPlane, Point, figures_of, front
 
 # Strategies and weights whose plans are held against the outer front.
 DRIVEN = (("conventional", 0), ("nox_cut", 0), ("ecms", 0), ("ecms", 30), ("dp", 7), ("dp", 300))
@@ -55,6 +65,17 @@ def test_the_largest_gap_is_that_of_the_half_planes_known():
     found = front(two_steps(), [0.0, 2.0])
     assert np.allclose(found.corners, [(4e-4, 2e-4)], rtol=1e-9)
     assert found.gap == pytest.approx(8 / 6 - 1, rel=1e-9)
+
+
+def test_a_plan_that_ends_short_and_below_the_bound_has_no_gap():
+    car, cycle = load_architecture("A"), load_cycle("nedc")
+    short, level = Point((0.0,), 0.9, 0.0), Point((0.0,), 1.0 - 1e-12, 0.0)
+    planes = (HalfPlane(0.0, 1.0, "one multiplier"),)
+    gaps = [
+        figures_of(Front((point,), planes, (), 0.0), car, cycle, "ecms")["points"][0]["gap_percent"]
+        for point in (short, level)
+    ]
+    assert gaps == [None, 0.0]
 
 
 @pytest.mark.parametrize("seed", range(24))

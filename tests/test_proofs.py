@@ -36,7 +36,7 @@ from hevopt.lower_dp import lower_bound_kg
 from hevopt.prices import Line, one_price_dual
 from hevopt.problem import Signals
 from hevopt.step_prices import costate_dual, line_above
-from hevopt.strategies import a_ecms, conventional, dp, ecms, mpc
+from hevopt.strategies import a_ecms, conventional, convex, dp, ecms, mpc
 
 RUN = Path(__file__).with_name("proofs") / "run.py"
 
@@ -329,3 +329,12 @@ def test_a_battery_of_nanovolts_is_solved_and_proven():
         rollout.soc[1] - rollout.soc[0] == pytest.approx(-4e-11 / 1.25e-9, rel=0.02)
     )
     assert certify(problem, rollout, target_gap=0.0).bound_of(rollout)[0] > 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_convex_solves_powers_at_the_voltages_peak():
+    problem = peak_problem(0.0)
+    plan = convex.solve(problem)
+    best = simulate(problem, dp.solve(problem).control).cost_kg
+    assert plan.notes["relaxation_kg"] <= best * (1 + 1e-9)
+    assert simulate(problem, plan.control).cost_kg >= best * (1 - 1e-9)

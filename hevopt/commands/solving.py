@@ -161,6 +161,7 @@ def run(
         {},
         nox_weight,
         end_asked=study.end_asked([car]),
+        lost_proofs=study.lost_proofs(case),
     )
     if out is not None:
         columns = outputs.step_columns(case, trajectory)

@@ -14,6 +14,7 @@ from hevopt.pages.results import FORMAT, CarFigures, Results, Row
 _MEGABYTES_MAX = 500
 _MAGIC = b"\x1f\x8b"
 _FAULTS_LISTED = 5
+_ROUNDING_PERCENT = 1e-6
 # What every solved row has; the others do not exist for every engine, fuel or bound.
 _FIGURES_OF_A_SOLVED_ROW = (
     "fuel_l_per_100km", "fuel_corrected_l_per_100km", "co2_g_per_km", "soc_start", "soc_end", "engine_starts",
@@ -93,6 +94,8 @@ def _faults_of_row(results: Results, row: Row) -> list[str]:
         for name in _FIGURES_OF_A_SOLVED_ROW
         if getattr(row.figures, name) is None
     ]
+    if (row.figures.gap_percent or 0.0) < -_ROUNDING_PERCENT:
+        faults.append(".figures.gap_percent: below 0, a bound above a plan")
     steps, trace = len(car.time_s), detail.trace.model_dump()
     if {len(values) - (name == "soc") for name, values in trace.items()} != {steps}:
         faults.append(f".detail.trace: not of {steps} steps, as car {printable(car.name)} has")

@@ -13,10 +13,13 @@ solver's multipliers and are evaluated afresh: however inexact the solver, what 
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.battery import source_power_w
 from hevopt.problem import Problem
 from hevopt.strategies._convex_parts import Cell, Hulls
 
 Array = NDArray[np.float64]
+# At the voltage's peak dr/dP has no end; any slope gives a tangent.
+_LEAST_ROOT = 1e-3
 
 
 def dual_value_kg(
@@ -59,8 +62,10 @@ def _best_slope(hulls: Hulls, cell: Cell, priced: Array, squared_v2: Array) -> A
     first, block, power = hulls.first[:-1], hulls.block, hulls.power_w
     factor = np.where(power < 0, cell.efficiency, 1.0)
     ohm = np.where(power < 0, cell.charge_ohm, cell.discharge_ohm)
-    root = np.sqrt(1 - 4 * ohm * power / squared_v2[block])
-    total = hulls.cost_kg + priced[block] * factor * 2 * power / (1 + root)
+    voltage = np.sqrt(squared_v2)[block]
+    chemical, root_v = source_power_w(power, voltage, ohm)
+    root = np.maximum(root_v / voltage, _LEAST_ROOT)
+    total = hulls.cost_kg + priced[block] * factor * chemical
     least = np.repeat(np.minimum.reduceat(total, first), np.diff(hulls.first))
     corners = np.flatnonzero(total <= least)
     corner = corners[np.searchsorted(block[corners], np.arange(len(first)))]

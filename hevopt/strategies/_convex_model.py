@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.battery import source_power_w
 from hevopt.errors import InfeasibleError, SolverError
 from hevopt.problem import Problem
 from hevopt.strategies._convex_dual import dual_value_kg
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 SOLVER = "CLARABEL"
 # Segments kept for the solver: those whose slope lies within this share of the expected price, else every fourth.
 _NEAR, _SPARSE = 0.1, 4
+# Where the expected slope of the battery's losses ends, near the voltage's peak.
+_LEAST_ROOT = 0.03
 
 
 class Solution(NamedTuple):
@@ -99,7 +102,9 @@ def _segments(hulls: Hulls, cell: Cell, price_kgpj: float) -> _Lines:
     left = np.flatnonzero(one_block)
     slope = (np.diff(hulls.cost_kg)[left]) / np.diff(hulls.power_w)[left]
     ohm = np.where(hulls.power_w < 0, cell.charge_ohm, cell.discharge_ohm)
-    root = np.sqrt(np.maximum(1 - 4 * ohm * hulls.power_w / cell.intercept_v2[0], 1e-3))
+    lowest_v = np.sqrt(cell.intercept_v2[0])
+    root = source_power_w(hulls.power_w, lowest_v, ohm)[1] / lowest_v
+    root = np.maximum(np.nan_to_num(root), _LEAST_ROOT)
     expected = (price_kgpj * hulls.step_s[hulls.step][block] / root)[left]
     near = np.abs(-slope - expected) <= _NEAR * expected
     place = left - hulls.first[block[left]]

@@ -68,6 +68,10 @@ def _changed(nedc, change):
             "rows.3.figures.gap_percent",
         ),
         (
+            lambda nedc: _changed(nedc, lambda c: c["rows"][3]["figures"].update(gap_percent=-0.007)),
+            "rows.3.figures.gap_percent: below 0, a bound above a plan",
+        ),
+        (
             lambda nedc: _changed(nedc, lambda c: c.update(nox_weight=float("nan"))),
             "nox_weight: input should be a finite number",
         ),
