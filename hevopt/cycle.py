@@ -33,7 +33,7 @@ _ACCELERATION_MAX_MPS2 = 20.0
 # Figures per distance say nothing below this.
 DISTANCE_MIN_M = 1.0
 # For a log or another tool's cycle given where one of our own is expected.
-_IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
+IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
 _OTHERS = (".xls", ".xlsx", ".mat", ".vdri", ".tsv")
 # Called with every fault found: line and text.
 _Tell = Callable[[int, str], None]
@@ -80,9 +80,19 @@ class Cycle:
 def load_cycle(name: str | Path) -> Cycle:
     """The cycle of a shipped name (`nedc`) or a CSV file's path; DataError names line and value."""
     if Path(name).suffix.lower() in _OTHERS and os.path.exists(name):
-        raise DataError(f"{printable(str(name))}: not a cycle file, NAME.csv; {_IMPORT}")
-    path = find("cycles", name, ".csv")
-    return cycle_of(path, read_text(path, _MEGABYTES_MAX))
+        raise DataError(f"{printable(str(name))}: not a cycle file, NAME.csv; {IMPORT}")
+    known = Path(name).suffix and os.path.isfile(name)
+    path = Path(name) if known else find("cycles", name, ".csv")
+    return cycle_of(path, _text(path))
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text(path, _MEGABYTES_MAX)
+    except DataError as error:
+        if isinstance(error.__context__, UnicodeDecodeError):
+            raise DataError(f"{error}; {IMPORT}") from None
+        raise
 
 
 def shipped_cycles() -> list[Cycle]:
@@ -102,7 +112,7 @@ def cycle_of(path: Path, text: str) -> Cycle:
 def faults_in(path: Path) -> list[Fault | str]:
     """Every faulty line of a cycle file, or else what is wrong with the whole of it."""
     faults: list[tuple[int, str]] = []
-    text = read_text(path, _MEGABYTES_MAX)
+    text = _text(path)
     try:
         with np.errstate(
             over="ignore", invalid="ignore"
@@ -182,7 +192,7 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
         hint = f"close matches: {', '.join(close)}; " if close else ""
         raise DataError(
             f"{path}, line {number}: unknown column {shown(unknown[0])}; {hint}"
-            f"allowed: {', '.join(COLUMNS)}; {_IMPORT}"
+            f"allowed: {', '.join(COLUMNS)}; {IMPORT}"
         )
     if len(set(cells)) != len(cells):
         twice = next(cell for cell in cells if cells.count(cell) > 1)
@@ -191,7 +201,7 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
     if "time_s" not in cells or len(speeds) != 1:
         raise DataError(
             f"{path}, line {number}: found columns {', '.join(cells)}; needed: time_s and exactly "
-            f"one of {', '.join(_SPEED_COLUMNS)}; {_IMPORT}"
+            f"one of {', '.join(_SPEED_COLUMNS)}; {IMPORT}"
         )
     if "clutch_open" in cells and "gear" not in cells:
         raise DataError(f"{path}, line {number}: clutch_open without gear; add the column gear")

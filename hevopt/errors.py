@@ -101,9 +101,10 @@ class SolverError(HevoptError):
     exit_status = 3
 
 
-def unknown_name(kind: str, name: str, known: list[str]) -> DataError:
-    """A DataError for a misspelt name, listing the close matches first."""
-    close = get_close_matches(name, known, n=3, cutoff=0.4)
+def unknown_name(kind: str, name: str, known: list[str], meant: Sequence[str] = ()) -> DataError:
+    """A DataError for a misspelt name, listing the close matches first; meant: known ones also called so."""
+    near = get_close_matches(name, known, n=3, cutoff=0.8 if meant else 0.4)
+    close = list(dict.fromkeys([*near, *meant]))
     lowered = [k for k in known if k.lower() == name.lower() and k not in close]
     best = f"close matches: {', '.join(lowered + close)}; " if lowered or close else ""
     return DataError(f"{kind} {name!r} not found; {best}available: {', '.join(known)}")

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.architecture import COMPONENTS, component_contents, load_architecture
-from hevopt.cycle import faults_in, load_cycle
+from hevopt.cycle import IMPORT, faults_in, load_cycle
 from hevopt.datafile import FileModel, faults_of, read_contents
-from hevopt.errors import DataError
+from hevopt.errors import DataError, Fault
 from hevopt.file_schema import MODELS
 from hevopt.files import read_text
+from hevopt.imports.measured import columns_found, read_measured
 from hevopt.study_file import CompareFile
 from hevopt.sweeps.study_file import StudyFile
 from hevopt.units import KMH_PER_MPS
@@ -33,6 +34,7 @@ class Finding:
     """What a file is, in words, and its faults, each with file, key path or line, value and what is allowed.
 
     count: how many there are; beyond some tens of lines of a cycle, `faults` ends with how many are left out
+    advice: what to do about all of them, or ''
     """
 
     path: Path
@@ -40,6 +42,7 @@ class Finding:
     about: str
     faults: list[str]
     count: int
+    advice: str = ""
 
 
 def finding(path: Path, kind: str, about: str, faults: list[str]) -> Finding:
@@ -49,10 +52,29 @@ def finding(path: Path, kind: str, about: str, faults: list[str]) -> Finding:
 
 def kind_and_contents(path: Path) -> tuple[str, dict[str, Any]]:
     """The kind of a file, and its keys and values unless it is a cycle."""
-    if _is_cycle(path):
-        return CYCLE, {}
-    contents = read_contents(path)
+    try:
+        if _is_cycle(path):
+            return CYCLE, {}
+        contents = read_contents(path)
+    except DataError as error:
+        raise _of_measured(path) or error from None
     return _kind_of(path, contents), contents
+
+
+def _of_measured(path: Path) -> DataError | None:
+    """What to say of a measured table, such as a logged drive, given where a file of hevopt is expected."""
+    if path.suffix.lower() == ".toml":
+        return None
+    try:
+        measured = read_measured(path)
+    except DataError:
+        return None
+    if len(measured.columns) < 2 or len(measured.lines) < 2:
+        return None
+    return DataError(
+        f"{path}: a table ({columns_found(measured)}), neither TOML nor a cycle file; {IMPORT}; measured maps by "
+        "`hevopt maps import`, coast-downs by `hevopt coastdown`"
+    )
 
 
 def _kind_of(path: Path, contents: dict[str, Any]) -> str:
@@ -121,7 +143,8 @@ def cycle_finding(path: Path) -> Finding:
             *map(str, found[:_LINES_LISTED]),
             *([f"{path}: and {left} more"] if left > 0 else []),
         ]
-        return Finding(path, CYCLE, "", faults, len(found))
+        advice = IMPORT if any(isinstance(fault, Fault) for fault in found) else ""
+        return Finding(path, CYCLE, "", faults, len(found), advice)
     cycle = load_cycle(path.absolute())
     about = (
         f"{cycle.name}: {cycle.duration_s:g} s, {cycle.distance_m / 1e3:.2f} km, up to "

@@ -4,7 +4,7 @@ A path is anything with a separator or a suffix; it is taken as it stands. A nam
 shipped files, which lie inside the installed package, or beside it in a checkout.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import date, time
 from difflib import get_close_matches
 from functools import cache
@@ -14,6 +14,16 @@ from hevopt.errors import DataError, unknown_name
 
 _PACKAGE = Path(__file__).resolve().parent
 _SHOWN_CHARACTERS = 40
+# Kind -> part of a name that people use -> shipped files of which that may speak.
+_ALSO_CALLED = {
+    "cycles": {
+        "wltp": "wltc_class3b", "wltc": "wltc_class3b", "gtr15": "wltc_class3b",
+        "cadc": "cadc_urban cadc_road cadc_motorway130", "artemis": "cadc_urban cadc_road cadc_motorway130",
+        "ftp": "ftp75 udds", "epa75": "ftp75", "epacity": "udds ftp75", "udds": "udds", "la4": "udds",
+        "fhds": "hwfet", "hwfet": "hwfet", "hwy": "hwfet", "highway": "hwfet", "us06": "us06",
+        "nedc": "nedc", "mveg": "nedc", "ece15": "nedc", "eudc": "nedc",
+    },
+}  # fmt: skip
 
 
 @cache
@@ -69,7 +79,15 @@ def find(
             f"{word} {shown(text)} cannot be looked up ({error.strerror}); check the name or path"
         ) from None
     known = [*_names_in(beside, suffix), *shipped_names(kind, suffix)]
-    raise unknown_name(word, text, list(filter(fits, dict.fromkeys(known))))
+    known = list(filter(fits, dict.fromkeys(known)))
+    raise unknown_name(word, text, known, meant_by(kind, text))
+
+
+def meant_by(kind: str, name: str) -> list[str]:
+    """Shipped files that are also called something like a name, such as wltc_class3b for WLTP."""
+    plain = "".join(letter for letter in name.lower() if letter.isalnum())
+    found = [names for part, names in _ALSO_CALLED.get(kind, {}).items() if part in plain]
+    return list(dict.fromkeys(name for names in found for name in names.split()))
 
 
 def _names_in(folder: Path | None, suffix: str) -> list[str]:
@@ -94,16 +112,16 @@ def _file_at(
         raise DataError(f"{word} file {text} is not a regular file; give a {suffix} file or a name")
     there = _names_in((beside or Path()) / path.parent, suffix)
     hint = _close("there with a close name", path.stem, filter(fits, there))
-    hint += _close(
-        "shipped with a close name", path.stem, filter(fits, shipped_names(kind, suffix))
-    )
+    meant = meant_by(kind, path.stem)
+    shipped = filter(fits, shipped_names(kind, suffix))
+    hint += _close("shipped with a close name", path.stem, shipped, meant)
     raise DataError(
         f"{word} file {text} does not exist; {hint}give the path of a {suffix} file or a name"
     )
 
 
-def _close(what: str, name: str, known: Iterable[str]) -> str:
-    close = get_close_matches(name, known, n=3)
+def _close(what: str, name: str, known: Iterable[str], meant: Sequence[str] = ()) -> str:
+    close = dict.fromkeys([*get_close_matches(name, known, n=3), *meant])
     return f"{what}: {', '.join(close)}; " if close else ""
 
 

@@ -18,7 +18,7 @@ from hevopt.file_checks import (
     finding,
     kind_and_contents,
 )
-from hevopt.files import find, is_path, printable, shipped_names, shown
+from hevopt.files import find, is_path, meant_by, printable, shipped_names, shown
 from hevopt.study_checks import compare_faults, sweep_faults
 
 _SHIPPED = (("architectures", ".toml"), ("cycles", ".csv"), ("architectures/components", ".toml"))
@@ -60,7 +60,7 @@ def _file(name: str) -> Path:
     if name in names:
         kind, suffix = names[name]
         return find(kind, name, suffix)
-    close = get_close_matches(name, names, n=3)
+    close = dict.fromkeys([*get_close_matches(name, names, n=3), *meant_by("cycles", name)])
     hint = f"close matches: {', '.join(close)}; " if close else ""
     raise DataError(
         f"{printable(name)}: no such file, and no shipped architecture, component or cycle has that name; {hint}"

@@ -80,6 +80,8 @@ def validate(
         fresh = [fault for fault in finding.faults if fault not in seen]
         for fault in fresh:
             write(f"  {fault}")
+        if finding.advice and fresh:
+            write(f"  {finding.advice}")
         if len(fresh) < len(finding.faults):
             write(f"  listed above: {len(finding.faults) - len(fresh)}")
         seen |= set(fresh)
