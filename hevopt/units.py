@@ -50,6 +50,7 @@ _SPELLINGS: dict[str, dict[str, float]] = {
         "ns nanosecond nanoseconds": 1e-9,
         "min minute minutes": 60.0,
         "h hr hour hours": 3600.0,
+        "day days": 86400.0,
     },
     "speed": {
         "m/s mps m/sec ms-1 meter/s metre/s meters/s metres/s meter/second metre/second meters/second "

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import printable
-from hevopt.imports.measured import Column, Measured, in_si
+from hevopt.imports.measured import Column, Measured
+from hevopt.imports.measured_units import in_si, numbers_of
 from hevopt.units import unit_named
 
 Array = NDArray[np.float64]
@@ -73,7 +74,7 @@ def directions_in(measured: Measured, column: Column, unit: str | None) -> Direc
     if column.words:
         codes, words = _coded(column)
         return Directions(codes, words, False, note)
-    return Directions(column.values, (), False, note)
+    return Directions(numbers_of(column), (), False, note)
 
 
 def _coded(column: Column) -> tuple[Array, tuple[str, ...]]:

@@ -19,11 +19,11 @@ from hevopt.imports.measured import (
     column_named,
     column_of,
     columns_found,
-    in_si,
     read_measured,
 )
 from hevopt.imports.measured_names import base_of, unit_in_name
 from hevopt.imports.measured_rows import runs
+from hevopt.imports.measured_units import in_si, numbers_of
 
 Array = NDArray[np.float64]
 
@@ -146,10 +146,10 @@ def _grid(measured: Measured, source: Source, what: str) -> Table:
     down, across, units = _axes(measured, source)
     role = next((r for r in VALUES_OF[what] if r in source.units), VALUES_OF[what][0])
     head = np.array([float(column.name.replace(",", ".")) for column in measured.columns[1:]])
-    cells = np.column_stack([column.values for column in measured.columns[1:]])
+    cells = np.column_stack([numbers_of(column) for column in measured.columns[1:]])
     rows = len(measured.lines)
     raw = {
-        down: np.repeat(measured.columns[0].values, len(head)),
+        down: np.repeat(numbers_of(measured.columns[0]), len(head)),
         across: np.tile(head, rows),
         role: cells.ravel(),
     }

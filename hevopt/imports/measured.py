@@ -21,8 +21,8 @@ from hevopt.imports.measured_names import (
     unit_in_name,
     units_in_name,
 )
-from hevopt.imports.measured_rows import Table, listed
-from hevopt.units import Unit, unit_named, units_of
+from hevopt.imports.measured_rows import Table
+from hevopt.units import unit_named
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,8 @@ class Column:
     values: (row,) NaN where the cell is empty or no number; strange: (row, text) of the first cells that are no
     numbers, strange_count of them in all; words: rows of each such text, of the first few texts
     against: another unit that the file states, and how; fixed: whether the cells themselves carry the unit
+    clock: "date", "time of day" or "moment" where the cells are such; also: names in further header rows
+    unclear: why the numbers could mean two things, or ''
     """
 
     name: str
@@ -59,6 +61,9 @@ class Column:
     words: Mapping[str, Sequence[int]] = field(default_factory=dict)
     against: tuple[str, str] | None = None
     fixed: bool = False
+    clock: str = ""
+    also: tuple[str, ...] = ()
+    unclear: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,19 +74,6 @@ class Measured:
     columns: tuple[Column, ...]
     lines: NDArray[np.int64]
     notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Quantity:
-    """A column in SI.
-
-    values: (row,); quantity: a key of the unit table; note: the column's name, its unit and how that is known
-    """
-
-    name: str
-    quantity: str
-    values: Array
-    note: str
 
 
 def read_measured(
@@ -161,11 +153,17 @@ def _columns(path: Path, table: Table) -> list[Column]:
             unit, source = table.units[i], table.units_source
         elif name in convention:
             unit, source = convention[name]
+        also = table.also[i] if table.also else ()
         stated = [convention[name]] if name in convention else units_in_name(name)
+        stated += [found for other in also for found in units_in_name(other)]
+        if not unit and stated:
+            unit, source = stated[0]
         against = next((s for s in stated if unit and unit_named(s[0]) != unit_named(unit)), None)
         values = cells.values()
+        unclear = table.unclear[i] if table.unclear else ""
         column = Column(
-            name, unit, values, source, tuple(cells.strange), cells.strange_count, cells.words, against
+            name, unit, values, source, tuple(cells.strange), cells.strange_count, cells.words, against,
+            also=also, unclear=unclear,
         )  # fmt: skip
         column = _carrying_units(column, cells, table)
         column.values.flags.writeable = False
@@ -195,6 +193,7 @@ def _carrying_units(column: Column, cells: Cells, table: Table) -> Column:
         elif column.unit and known != own:
             what += f"; {column.unit} of the {column.source} is not applied"
         column = replace(column, unit=unit, source=what, against=against, fixed=True)
+        column = replace(column, clock=cells.clock() if kind == "clock" else "")
     return column
 
 
@@ -202,6 +201,7 @@ def column_named(measured: Measured, name: str) -> Column:
     """The column that a user names: as in the file, without its unit, or by its number from 1."""
     exact = [c for c in measured.columns if c.name == name]
     matches = exact or [c for c in measured.columns if base_of(c.name) == base_of(name)]
+    matches = matches or [c for c in measured.columns if base_of(name) in map(base_of, c.also)]
     if not matches and name.isdecimal() and 0 < int(name) <= len(measured.columns):
         matches = [measured.columns[int(name) - 1]]
     if len(matches) == 1:
@@ -222,12 +222,23 @@ def column_of(measured: Measured, aliases: Collection[str], option: str) -> Colu
     None where there is none; DataError where there are several, between which the option chooses.
     """
     found = [c for c in measured.columns if base_of(c.name) in aliases]
+    found = found or [c for c in measured.columns if any(base_of(n) in aliases for n in c.also)]
     if len(found) > 1:
         names = ", ".join(c.name for c in found)
         raise DataError(
             f"{measured.path}: columns {names} could all be meant; choose with {option}"
         )
     return found[0] if found else None
+
+
+def first_column_of(
+    measured: Measured, tiers: Sequence[Collection[str]], option: str
+) -> Column | None:
+    """The column of the first group of aliases that names one, such as the car's own speed before that of a GPS."""
+    for aliases in tiers:
+        if column := column_of(measured, aliases, option):
+            return column
+    return None
 
 
 def columns_found(measured: Measured) -> str:
@@ -238,75 +249,3 @@ def columns_found(measured: Measured) -> str:
     ]
     more = f" and {len(named) - _COLUMNS_NAMED} more" if len(named) > _COLUMNS_NAMED else ""
     return f"columns found: {', '.join(named[:_COLUMNS_NAMED])}{more}"
-
-
-def in_si(
-    measured: Measured,
-    column: Column,
-    allowed: Sequence[str],
-    option: str,
-    unit: str | None = None,
-    *,
-    text_as_empty: bool = False,
-) -> Quantity:
-    """A column in SI by its unit, or by `unit` where the user gives one with the option.
-
-    allowed: quantities of the unit table that will do, such as "speed"; DataError for a missing or other unit, and
-    for cells that are no numbers unless those count as empty.
-    """
-    given, source = (unit, option) if unit is not None else (column.unit, column.source)
-    known = known_unit(measured, column, given, allowed, option)
-    if column.fixed and known != unit_named(column.unit):
-        raise DataError(
-            f"{measured.path}: column {column.name} holds {column.source}, which are never taken in "
-            f"{shown(unit)}; leave {option} out"
-        )
-    if unit is None:
-        _refuse_contradiction(measured, column, allowed, option)
-    if column.strange and not text_as_empty:
-        faults = [f"line {measured.lines[row]}: {shown(text)}" for row, text in column.strange]
-        more = column.strange_count - len(faults)
-        raise DataError(
-            f"{measured.path}: column {column.name}: {listed(faults)}{f' and {more} more' * (more > 0)}: not "
-            "usable numbers; correct these cells, or empty them"
-        )
-    if unit is not None and column.unit is not None and unit_named(column.unit) != known:
-        source += f", against {column.unit} in the file"
-    values = column.values * known.si
-    values.flags.writeable = False
-    note = f"{column.name} in {known.symbol} ({source})"
-    return Quantity(column.name, known.quantity, values, note)
-
-
-def _refuse_contradiction(
-    measured: Measured, column: Column, allowed: Sequence[str], option: str
-) -> None:
-    """DataError where the file states two units; a suffix of another quantity is taken for a part of the name."""
-    if column.against is None:
-        return
-    unit, how = column.against
-    if how != "suffix of the name" or unit_named(unit).quantity in allowed:
-        raise DataError(
-            f"{measured.path}: column {column.name}: unit {shown(column.unit)} ({column.source}), but "
-            f"{shown(unit)} ({how}); correct the file, or say which holds with {option}"
-        )
-
-
-def known_unit(
-    measured: Measured, column: Column, given: str | None, allowed: Sequence[str], option: str
-) -> Unit:
-    """The unit with a text, if it measures one of the allowed quantities."""
-    choices = ", ".join(symbol for quantity in allowed for symbol in units_of(quantity))
-    if given is None:
-        raise DataError(
-            f"{measured.path}: the unit of column {column.name} is not in the file; give it with {option}, "
-            f"or in the header, such as {column.name} [{units_of(allowed[0])[0]}]; known: {choices}"
-        )
-    known = unit_named(given)
-    if known is None or known.quantity not in allowed:
-        what = "is unknown" if known is None else f"is one of {known.quantity}"
-        raise DataError(
-            f"{measured.path}: column {column.name}: unit {shown(given)} {what}; needed is {' or '.join(allowed)}; "
-            f"known: {choices}; correct the header, or give the unit with {option}"
-        )
-    return known

@@ -1,20 +1,19 @@
 """Cells of a measured file to numbers: decimal marks, empty cells, times of day; what is no number is kept.
 
 A comma in a number is a decimal mark only where the file shows that it cannot separate thousands: some number
-such as 0,5 or 12,75 must settle it. A number with both marks, or a file that uses both, is refused.
+such as 0,5 or 12,75 must settle it. A column with both marks, or one that stays open, is refused where it is used.
 """
 
 import re
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, time
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.errors import DataError
 from hevopt.files import shown
 from hevopt.imports.measured_dates import Slashed, in_order, is_moment, moment_in
 
@@ -39,7 +38,8 @@ class Cells:
     """A column while it is read. `found` maps a way of writing to the first line and cell that has it.
 
     strange: (row, text) of cells that are neither numbers nor empty; words: rows of each text among them, of the
-    first few texts; clock: rows with dates or times of day; percent: rows with numbers such as 3 %
+    first few texts; clock: rows with dates or times of day; dated, midnight: of these, dates and dates at 0:00;
+    percent: rows with numbers such as 3 %
     slashed: row, two numbers, year and seconds of each date whose order the column decides, which is then `order`
     """
 
@@ -53,8 +53,16 @@ class Cells:
     number_count: int = 0
     slow_count: int = 0
     first_date: datetime | None = None
+    dated_count: int = 0
+    midnight_count: int = 0
     slashed: array = field(default_factory=lambda: array("d"))
     order: str = ""
+
+    def clock(self) -> str:
+        """What a column of dates and times holds: "date", "time of day", or "moment" for both."""
+        if self.dated_count == 0:
+            return "time of day"
+        return "date" if self.midnight_count == self.clock_count else "moment"
 
     def values(self) -> NDArray[np.float64]:
         """(row,) NaN where a cell is empty or strange; dates of open order are decided here, or become strange."""
@@ -105,7 +113,8 @@ def _fast(column: Cells, cells: Sequence[str], lines: Sequence[int]) -> NDArray 
         _find(column, "comma", cells, lines, lambda c: _is_decimal(c, ","))
         cells = joined.replace(",", ".").split("\n")
     elif "." in joined:
-        _find(column, "point", cells, lines, lambda c: "." in c)
+        _find(column, "perhaps point", cells, lines, lambda c: "." in c)
+        _find(column, "point", cells, lines, lambda c: _is_decimal(c, "."))
     try:
         values = np.fromiter((float(c or "nan") for c in cells), float, len(cells))
     except ValueError:
@@ -137,7 +146,7 @@ def _is_decimal(cell: str, mark: str) -> bool:
 def _slow(column: Cells, cell: str, line: int, row: int) -> float:
     if cell.lower() in EMPTY:
         return np.nan
-    if cell[0] in "0123456789+-.,":
+    if cell[0] in "0123456789+-.," or (cell[0].isalpha() and cell[-1].isdecimal()):
         value = _number(column, cell, line, row)
         if value is not None:
             return value
@@ -166,7 +175,8 @@ def _number(column: Cells, cell: str, line: int, row: int) -> float | None:
             kind = "comma" if _is_decimal(cell, ",") else "perhaps thousands"
             column.found.setdefault(kind, (line, cell))
         elif "." in cell:
-            column.found.setdefault("point", (line, cell))
+            kind = "point" if _is_decimal(cell, ".") else "perhaps point"
+            column.found.setdefault(kind, (line, cell))
         return value
     moment = _moment(column, cell, row)
     if moment is not None:
@@ -174,6 +184,9 @@ def _number(column: Cells, cell: str, line: int, row: int) -> float | None:
         column.found.setdefault("clock", (line, cell))
     elif _THOUSANDS.fullmatch(cell):
         column.found.setdefault("thousands", (line, cell))
+        marks = [mark for mark in cell if mark in ".,"]
+        if len(set(marks)) == 2:  # the last one is the decimal mark
+            column.found.setdefault("comma" if marks[-1] == "," else "point", (line, cell))
     return moment
 
 
@@ -181,9 +194,11 @@ def _moment(column: Cells, cell: str, row: int) -> float | None:
     """Seconds since the column's first date, or since midnight; NaN for a date that the whole column decides."""
     moment = moment_in(cell)
     if isinstance(moment, Slashed):
+        _count_date(column, moment.seconds == 0)
         column.slashed.extend((row, *moment))
         return np.nan
     if isinstance(moment, datetime):
+        _count_date(column, moment.time() == time())
         column.first_date = column.first_date or moment
         try:
             return (moment - column.first_date).total_seconds()
@@ -192,26 +207,47 @@ def _moment(column: Cells, cell: str, row: int) -> float | None:
     return moment
 
 
-def check_decimal_mark(path: Path, columns: Sequence[Cells]) -> str:
-    """The file's decimal mark, '.' or ','; DataError where commas could separate thousands."""
-    numeric = [c for c in columns if c.number_count + c.clock_count >= c.strange_count]
+def _count_date(column: Cells, midnight: bool) -> None:
+    column.dated_count += 1
+    column.midnight_count += midnight
+
+
+def marks_of(path: Path, columns: Sequence[Cells]) -> tuple[str, list[str]]:
+    """The file's decimal mark, '.' or ',', and by column why its numbers could mean two things, '' where not."""
     first: dict[str, tuple[int, str]] = {}
-    for column in numeric + [c for c in columns if "thousands" in c.found]:
-        for kind, place in column.found.items():
-            first[kind] = min(first.get(kind, place), place)
-    if "thousands" in first:
-        raise _refused(path, *first["thousands"], "has a thousands separator")
-    comma = first.get("comma") or first.get("perhaps thousands")
-    if comma and "point" in first:
-        line, cell = first["point"]
-        raise _refused(path, *comma, f"has a decimal comma, but {cell} in line {line} a point")
-    if "perhaps thousands" in first and "comma" not in first:
-        raise _refused(path, *first["perhaps thousands"], "could be a thousand or a decimal comma")
-    return "," if comma else "."
+    for column in columns:
+        if column.number_count + column.clock_count >= column.strange_count or (
+            "thousands" in column.found
+        ):
+            for kind, place in column.found.items():
+                first[kind] = min(first.get(kind, place), place)
+    comma = "comma" in first or "perhaps thousands" in first
+    return "," if comma else ".", [_unclear(path, column.found, first) for column in columns]
 
 
-def _refused(path: Path, line: int, cell: str, why: str) -> DataError:
-    return DataError(
+def _unclear(path: Path, own: dict[str, tuple[int, str]], first: dict[str, tuple[int, str]]) -> str:
+    """Why the numbers of a column could mean two things; first: what the columns of the file show."""
+    if "thousands" in own:
+        return _refused(path, *own["thousands"], "has a thousands separator")
+    comma = own.get("comma") or own.get("perhaps thousands")
+    point = own.get("point") or own.get("perhaps point")
+    if comma and not point and "comma" not in own:
+        point = first.get("point") or first.get("perhaps point")
+    if comma and point:
+        line, cell = point
+        return _refused(path, *comma, f"has a decimal comma, but {cell} in line {line} a point")
+    if comma and "comma" not in first:
+        return _refused(path, *comma, "could be a thousand or a decimal comma")
+    if point and "point" not in own and "comma" in first:
+        line, cell = first["comma"]
+        return _refused(
+            path, *point, f"could be a thousand: {cell} in line {line} has a decimal comma"
+        )
+    return ""
+
+
+def _refused(path: Path, line: int, cell: str, why: str) -> str:
+    return (
         f"{path}, line {line}: {shown(cell)} {why}; write numbers without thousands separators and "
         "with one decimal mark throughout, such as 1234.5"
     )

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, islice
 from pathlib import Path
 
@@ -11,16 +11,8 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.files import printable
-from hevopt.imports.measured_cells import (
-    LISTED,
-    Cells,
-    check_decimal_mark,
-    is_empty,
-    is_value,
-    read_chunk,
-)
-from hevopt.imports.measured_names import cleaned, unit_in_cell
-from hevopt.units import unit_named
+from hevopt.imports.measured_cells import LISTED, Cells, is_empty, is_value, marks_of, read_chunk
+from hevopt.imports.measured_header import Row, header_of
 
 ROWS_MAX = 1_000_000
 CELLS_MAX = 10_000_000
@@ -30,12 +22,14 @@ _COLUMNS_MAX = 2_000
 # Cells that are not written as plain numbers take ten times as long.
 _SLOW_CELLS_MAX = 2_500_000
 
-Row = tuple[int, list[str]]  # line number, cells without blanks around them
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """What the rows of a file hold. units: None without a units row; lines: (row,)"""
+    """What the rows of a file hold. units: None without a units row; lines: (row,)
+
+    also: by column, its names in further header rows
+    unclear: by column, why its numbers may mean two things, or ''
+    """
 
     names: list[str]
     units: list[str] | None
@@ -43,41 +37,78 @@ class Table:
     lines: NDArray[np.int64]
     notes: list[str]
     units_source: str = "units row"
+    also: list[tuple[str, ...]] | None = None
+    unclear: list[str] | None = None
 
 
 def table_of(path: Path, rows: Iterable[Row], *, padded: bool) -> Table:
     """The table in some rows; `padded`: short rows end in empty cells rather than being faults."""
-    rows = _not_too_wide(path, iter(rows))
+    left_out = _LeftOut()
+    rows = _with_cells(path, iter(rows), left_out)
     head = list(islice(rows, _HEAD_ROWS))
     if padded:
         widest = max((len(cells) for _, cells in head), default=0)
         head = [(line, cells + [""] * (widest - len(cells))) for line, cells in head]
     start, width = _first_data_row(path, head)
-    names, units, used, notes = _header(head, start, width)
-    before = [line for line, _ in head[: start - used]]
+    header = header_of(head, start, width)
+    left_out.headers, notes = header.rows, header.notes
+    before = [line for line, _ in head[: start - len(header.rows)]]
     if before:
         notes.insert(0, f"text before the header: {runs(before)}")
-    columns, lines = _read(path, chain(head[start:], rows), width, padded)
-    if check_decimal_mark(path, columns) == ",":
-        notes.append("decimal comma")
+    columns, lines = _read(path, chain(head[start:], rows), width, padded, left_out)
+    mark, unclear = marks_of(path, columns)
+    notes += ["decimal comma"] * (mark == ",") + left_out.notes()
     kept = [
-        i for i in range(width) if names[i] != f"column {i + 1}" or _holds_something(columns[i])
+        i
+        for i in range(width)
+        if header.names[i] != f"column {i + 1}" or _holds_something(columns[i])
     ]
-    units = units and [units[i] for i in kept]
-    return Table([names[i] for i in kept], units, [columns[i] for i in kept], lines, notes)
+    names, columns, also, unclear = (
+        [values[i] for i in kept] for values in (header.names, columns, header.also, unclear)
+    )
+    units = header.units and [header.units[i] for i in kept]
+    return Table(names, units, columns, lines, notes, also=also, unclear=unclear)
+
+
+@dataclass(slots=True)
+class _LeftOut:
+    """Rows that are no data: those without any value, and headers that a logger writes again where it goes on."""
+
+    empty: list[int] = field(default_factory=list)
+    again: list[int] = field(default_factory=list)
+    headers: list[list[str]] = field(default_factory=list)
+
+    def takes(self, line: int, cells: list[str]) -> bool:
+        """Whether a row is such; if so, it is noted."""
+        if cells in self.headers:
+            self.again.append(line)
+        elif all(map(is_empty, cells)):
+            self.empty.append(line)
+        else:
+            return False
+        return True
+
+    def notes(self) -> list[str]:
+        """What a reader should know of them."""
+        kinds = (("rows without any value, left out", self.empty), ("header again", self.again))
+        return [f"{what}: {runs(sorted(lines))}" for what, lines in kinds if lines]
 
 
 def _holds_something(column: Cells) -> bool:
     return bool(column.number_count or column.clock_count or column.strange_count)
 
 
-def _not_too_wide(path: Path, rows: Iterator[Row]) -> Iterator[Row]:
+def _with_cells(path: Path, rows: Iterator[Row], left_out: _LeftOut) -> Iterator[Row]:
+    """Rows with text in some cell; DataError where one is too wide."""
     for line, cells in rows:
         if len(cells) > _COLUMNS_MAX:
             raise DataError(
                 f"{path}, line {line}: {len(cells)} columns; allowed: up to {_COLUMNS_MAX}"
             )
-        yield line, cells
+        if any(cells):
+            yield line, cells
+        else:
+            left_out.empty.append(line)
 
 
 def runs(lines: list[int]) -> str:
@@ -126,55 +157,8 @@ def _first_data_row(path: Path, head: list[Row]) -> tuple[int, int]:
     return start, width
 
 
-def _header(
-    head: list[Row], start: int, width: int
-) -> tuple[list[str], list[str] | None, int, list[str]]:
-    """Names, units row, how many rows both take, and notes."""
-    above = [(line, _padded(cells, width)) for line, cells in head[:start]]
-    above = [row if len(row[1]) == width else None for row in above]
-    units, used = None, 0
-    if (
-        len(above) > 1
-        and above[-1]
-        and above[-2]
-        and (units := _units_row(above[-1][1], above[-2][1]))
-    ):
-        used = 1
-    if len(above) <= used or above[-1 - used] is None:
-        return [f"column {i + 1}" for i in range(width)], None, 0, ["no header: columns by number"]
-    line, cells = above[-1 - used]
-    names = [cleaned(cell) or f"column {i + 1}" for i, cell in enumerate(cells)]
-    notes = [f"header in line {line}"]
-    if used:
-        notes.append(f"units row in line {above[-1][0]}")
-    return names, units, 1 + used, notes
-
-
-def _padded(cells: list[str], width: int) -> list[str]:
-    return cells + [""] * (width - len(cells)) if width - 2 <= len(cells) < width else cells
-
-
-def _units_row(cells: list[str], names: list[str]) -> list[str] | None:
-    """Units by column where the cells below some names are such; None where they are no units row.
-
-    One that no table knows, such as degC, is kept: it matters only where its column is used.
-    """
-    units = [unit_in_cell(cell) for cell in cells]
-    if not any(unit and unit != "1" and unit_named(unit) for unit in units):
-        return None
-    strange = units.count(None)
-    if not strange:
-        return units
-    filled = [name for name, cell in zip(names, cells, strict=True) if cell]
-    # Titles over groups of columns are no names: they repeat, or leave columns blank.
-    named = all(filled) and len(set(filled)) == len(filled) and not any(map(is_value, names))
-    if not named or 2 * strange > len(filled) or any(map(is_value, cells)):
-        return None
-    return [cell if unit is None else unit for unit, cell in zip(units, cells, strict=True)]
-
-
 def _read(
-    path: Path, rows: Iterator[Row], width: int, padded: bool
+    path: Path, rows: Iterator[Row], width: int, padded: bool, left_out: _LeftOut
 ) -> tuple[list[Cells], NDArray[np.int64]]:
     """Columns and the lines of their rows; DataError with all lines of another length."""
     columns = [Cells() for _ in range(width)]
@@ -188,6 +172,8 @@ def _read(
                 cells = cells[:width] + [c for c in cells[width:] if c]
             elif padded:
                 cells = cells + [""] * (width - len(cells))
+            if left_out.takes(line, cells):
+                continue
             if len(cells) == width:
                 kept.append((line, cells))
             else:

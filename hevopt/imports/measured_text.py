@@ -8,12 +8,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from hevopt.errors import DataError
+from hevopt.imports.measured_header import split_otherwise
 from hevopt.imports.measured_names import unit_in_cell
 from hevopt.imports.measured_rows import ROWS_MAX, Row, Table, numeric_share, runs, table_of
 
 _LINES_MAX = ROWS_MAX + 100_000
 _LINE_MAX = 1_000_000
 _HEAD_LINES = 500
+_HEADERS_MAX = 2
 _HEAD_LINE_MAX = 50_000
 _COMMENTS = ("#", "%", "//", "*")
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -174,7 +176,27 @@ def _with_commented_header(kept: Lines, comments: Lines, separator: str) -> Line
     return kept
 
 
+def _headers(lines: Lines, separator: str) -> dict[int, list[str]]:
+    """Line number and cells of the rows right above the data that are split otherwise than it."""
+    head = [(number, line, _split(line, separator)) for number, line in lines[:_HEAD_LINES]]
+    found: dict[int, list[str]] = {}
+    start = next((i for i, (*_, c) in enumerate(head) if len(c) > 1 and numeric_share(c) >= 0.5), 0)
+    above = [row for row in head[:start] if any(row[2])]
+    for number, line, cells in above[-_HEADERS_MAX:]:
+        if names := split_otherwise(
+            line, _words(line) if separator == " " else cells, separator, len(head[start][2])
+        ):
+            found[number] = names
+    return found
+
+
 def _rows(path: Path, lines: Lines, separator: str) -> Iterator[Row]:
+    headers = _headers(lines, separator)
+    for number, cells in _split_rows(path, lines, separator):
+        yield number, headers.get(number, cells)
+
+
+def _split_rows(path: Path, lines: Lines, separator: str) -> Iterator[Row]:
     if separator == " ":
         for number, line in lines:
             yield number, _words(line)

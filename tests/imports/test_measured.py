@@ -12,8 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hevopt.errors import DataError
-from hevopt.imports.measured import column_named, column_of, in_si, read_measured
+from hevopt.imports.measured import column_named, column_of, read_measured
 from hevopt.imports.measured_names import base_of, unit_in_name
+from hevopt.imports.measured_units import in_si, numbers_of
 from hevopt.units import unit_named
 
 QUICK = settings(
@@ -39,8 +40,10 @@ def read(tmp_path, text, name="table.csv", encoding="utf-8", **options):
 
 
 def refusal(tmp_path, text, name="table.csv", **options):
+    """What is said where a file cannot be read, or a column of it not be used."""
     with pytest.raises(DataError) as error:
-        read(tmp_path, text, name, **options)
+        for column in read(tmp_path, text, name, **options).columns:
+            numbers_of(column)
     return str(error.value)
 
 
@@ -78,12 +81,13 @@ def test_text_in_every_shape_comes_back(
     lines += [separator.join(map(cell, row)) for row in rows]
     text = before + "\n".join(lines) + "\n"
     measured = read(tmp_path, text.replace("\n", ends), encoding=encoding)
-    table_is(measured, rows)
+    filled = [k for k, row in enumerate(rows) if any(cell is not None for cell in row)]
+    table_is(measured, [rows[k] for k in filled])
     assert [c.name for c in measured.columns] == [f"größe_{i}" for i in range(len(first))]
     assert {c.unit for c in measured.columns} == ({"km/h"} if units_row else {None})
     head = before.count("\n") + 1 + units_row
-    # Rows whose cells are all empty are rows too, unless nothing separates them.
-    assert list(measured.lines) == [head + 1 + k for k in range(len(rows))]
+    # A row whose cells are all empty is none.
+    assert list(measured.lines) == [head + 1 + k for k in filled]
 
 
 @QUICK

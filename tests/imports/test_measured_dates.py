@@ -9,6 +9,8 @@ import pytest
 from hevopt.errors import DataError
 from hevopt.imports.cycle_import import import_cycle
 from hevopt.imports.measured import read_measured
+from hevopt.imports.measured_dates import Slashed, moment_in
+from hevopt.imports.month_names import month_of
 
 START = datetime(2024, 3, 1, 11, 59, 30)
 STEPS_S = np.array([0.0, 1, 2, 29, 30, 45, 3600, 90000, 1296000])
@@ -53,6 +55,45 @@ def test_half_days_begin_at_12(tmp_path):
     path.write_text("time;speed [km/h]\n" + "".join(f"{cell};1\n" for cell in cells))
     expected = [0, 3600, 43199, 43200, 46800, 86399.5]
     np.testing.assert_allclose(read_measured(path).columns[0].values, expected)
+
+
+MAY_7 = [
+    "07-May-2024 09:15:00.5", "7-mai-2024 09:15:00,5", "07/mag/2024 09.15.00,5",
+    "7 de mayo de 2024 9:15:00.5 a. m.",
+    "May 7, 2024 9:15:00.5 AM", "mar. 07 mai 2024 09:15:00.5", "2024-May-07 09:15:00.5", "7. Mai 2024 09:15:00.5",
+    "Tue May 07 09:15:00.5 2024", "7 maja 2024, 09:15:00.5", "07/05/2024 09:15:00.5", "5/7/24 9:15:00.5 AM",
+    "Tue, 07 May 2024 09:15:00.5 GMT",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("cell", MAY_7)
+def test_months_by_name_in_every_usual_order_are_dates(cell):
+    moment = moment_in(cell)
+    if isinstance(moment, Slashed):
+        assert {moment.first, moment.second, moment.year, moment.seconds} == {5, 7, 2024, 33300.5}
+    else:
+        assert moment.replace(tzinfo=None) == datetime(2024, 5, 7, 9, 15, 0, 500_000)
+
+
+@pytest.mark.parametrize(
+    ("month", "names"),
+    [
+        (1, "Jan January Januar Jänner janv. gen gennaio ene enero sty"), (2, "Feb févr. Februar lut fev"),
+        (3, "Mar Mär März mars mrt marzo março"), (4, "Apr avr. avril abr kwi"), (5, "May Mai mag maj mei maio"),
+        (6, "Jun giu juin cze czerwca"), (7, "Jul juil. lug julio lip"), (8, "Aug août aout ago sie"),
+        (9, "Sep Sept set wrz"), (10, "Oct Okt ott out paź"), (11, "Nov lis listopada"),
+        (12, "Dec Dez déc. dic gru des"), (0, "jui ma runs Ju"),
+    ],
+)  # fmt: skip
+def test_months_have_their_names_in_many_languages(month, names):
+    assert [month_of(name.rstrip(".")) for name in names.split()] == [month] * len(names.split())
+
+
+def test_zones_in_a_date_count_and_minutes_with_a_fraction_are_times(tmp_path):
+    summer, winter = (moment_in(f"Sun Oct 27 02:30:00 {z} 2024") for z in ("CEST", "GMT+01:00"))
+    assert (winter - summer).total_seconds() == 3600
+    assert moment_in("15:00.4") == 900.4 and moment_in("15:00") is None
+    assert moment_in("1:00:00 PM") == 46800 and moment_in("10:00:00 UTC") == 36000
 
 
 @pytest.mark.parametrize("form", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])

@@ -10,7 +10,8 @@ import pytest
 from hevopt.errors import DataError
 from hevopt.imports.cycle_import import import_cycle
 from hevopt.imports.map_tables import Source, read_table
-from hevopt.imports.measured import in_si, read_measured
+from hevopt.imports.measured import read_measured
+from hevopt.imports.measured_units import in_si
 
 
 def book(tmp_path, rows, number_format="General", column=3):
