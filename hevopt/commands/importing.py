@@ -10,7 +10,7 @@ from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
-    from hevopt.imports.cycle_import import Imported
+    from hevopt.imports.cycle_sampled import Imported
 
 
 def import_cycle(
@@ -25,8 +25,8 @@ def import_cycle(
         list[str] | None,
         typer.Option(
             metavar="ROLE=NAME",
-            help="The column of time, speed, distance, stop, grade, altitude, gear or clutch_open, by name or "
-            "number; nothing after = leaves it out. May be repeated.",
+            help="The column of time, date, speed, distance, stop, grade, altitude, gear or clutch_open, by name "
+            "or number; nothing after = leaves it out. May be repeated.",
         ),
     ] = None,
     unit: Annotated[
@@ -55,6 +55,15 @@ def import_cycle(
             help="Metres of road over which grade is taken from altitude; chosen by its noise without this."
         ),
     ] = None,
+    gaps: Annotated[
+        str | None,
+        typer.Option(
+            metavar="cut|split|bridge",
+            help="What becomes of gaps of more than a minute without a sample: cut joins what lies before and "
+            "after without their time, split makes one cycle a trip (NAME_1.csv, NAME_2.csv ...), bridge draws the "
+            "speed straight across. Shorter ones are dropouts, which --repair bridges.",
+        ),
+    ] = None,
     repair: Annotated[
         bool, typer.Option("--repair", help="Mend faults in the data; every change is listed.")
     ] = False,
@@ -63,7 +72,6 @@ def import_cycle(
     """Read a drive in another tool's shape, check it, resample it to 1 Hz; write it with --out."""
     from hevopt.imports import cycle_import
     from hevopt.imports.cycle_standstill import standstill_limit
-    from hevopt.writing import write_whole
 
     if out is not None:
         _check_out(out, file)
@@ -77,22 +85,34 @@ def import_cycle(
                 f"the unit of {role} is given by both {option} and --unit; leave one out"
             )
         units |= {} if given is None else {role: given}
-    imported = cycle_import.import_cycle(
-        file, columns=pairs("--column", column), units=units, sheet=sheet, repair=repair,
+    imported = cycle_import.import_drives(
+        file, columns=pairs("--column", column), units=units, sheet=sheet, repair=repair, gaps=gaps,
         acceleration_mps2=acceleration,
         standstill_mps=None if standstill is None else standstill_limit(standstill),
         altitude_baseline_m=altitude_baseline,
     )  # fmt: skip
-    _show(imported)
+    for cycle in imported:
+        _show(cycle)
+    _write(imported, out, file)
+
+
+def _write(imported: tuple["Imported", ...], out: Path | None, file: Path) -> None:
+    from hevopt.writing import check_outs, write_whole
+
     if out is None:
-        write("not written; add --out NAME.csv to write the cycle")
+        write("not written; add --out NAME.csv to write the cycle" + "s" * (len(imported) > 1))
         return
-    write_whole(out, imported.text.encode())
-    write(f"written to {out}; use it with --cycle {out}")
+    outs = [out]
+    if len(imported) > 1:
+        outs = [out.with_stem(f"{out.stem}_{k}") for k in range(1, len(imported) + 1)]
+        check_outs({f"--out, trip {k}": path for k, path in enumerate(outs, start=1)}, [file])
+    for path, cycle in zip(outs, imported, strict=True):
+        write_whole(path, cycle.text.encode())
+        write(f"written to {path}; use it with --cycle {path}")
 
 
 def _show(imported: "Imported") -> None:
-    from hevopt.imports.cycle_import import summary
+    from hevopt.imports.cycle_sampled import summary
 
     for text in imported.assumptions:
         write(f"read as: {text}")

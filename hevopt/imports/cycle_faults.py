@@ -1,6 +1,6 @@
 """What is wrong with a logged drive, line by line, and the repairs that a user may ask for."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from hevopt.errors import DataError
 from hevopt.imports.cycle_columns import Drive
 from hevopt.imports.cycle_fault_list import Faults, empty_cell, refused
 from hevopt.imports.cycle_spikes import spikes, text_of
-from hevopt.imports.cycle_times import past_midnight, report_gaps, times_in_order
+from hevopt.imports.cycle_times import report_gaps, rows_of, running_on, spread, times_in_order
 from hevopt.units import KMH_PER_MPS
 
 Array = NDArray[np.float64]
@@ -22,27 +22,46 @@ _GEAR_MAX = 20
 _REPAIRED_SHARE_MAX = 0.25
 
 
-def sound(drive: Drive, repair: bool) -> tuple[Drive, list[str]]:
-    """The drive over time without faults, and the changes made; DataError with all faults where there are any.
+@dataclass(frozen=True, slots=True, eq=False)
+class Sound:
+    """A drive over time without faults.
 
-    With `repair`, every fault is mended as `_repaired` says and listed, unless too many lines would change.
+    faults: what was wrong and is mended; said: what needed no repair
+    long_gaps: rows before gaps of more than a minute
+    """
+
+    drive: Drive
+    faults: Faults
+    said: tuple[str, ...]
+    long_gaps: NDArray[np.int64]
+
+
+def sound(drive: Drive) -> Sound:
+    """The drive after the repairs; DataError where too many of its lines would change.
+
+    A clock that begins again runs on; lines with a time out of order are left out; speeds below 0 are set to 0,
+    missing ones, spikes and dropouts drawn straight between their neighbours; other columns hold their last value.
     """
     faults = Faults()
-    mended = _repaired(drive, faults)
-    if not faults.found:
-        return drive, []
-    lines = len({fault[0] for fault in faults.found})
-    rows = len(drive.lines)
-    if not repair:
-        advice = "correct the file, or let --repair mend these lines as told"
-        raise refused(drive.measured.path, faults, advice + _rates(drive))
+    mended, said = spread(running_on(drive, faults))
+    kept = times_in_order(mended, faults)
+    if len(kept) < 2:
+        raise DataError(f"{drive.measured.path}: one line; a drive needs at least 2")
+    if kept.sum() < 2:
+        advice = "fewer than 2 lines have a time in order; a drive needs at least 2: check the column of time"
+        raise refused(drive.measured.path, faults, advice)
+    mended = rows_of(mended, kept)
+    long_gaps = report_gaps(mended, faults)
+    speed_mps = _speeds(mended, faults)
+    mended = replace(mended, speed_mps=speed_mps, **held_columns(mended, faults))
+    lines, rows = len({fault[0] for fault in faults.found}), len(drive.lines)
     if lines > _REPAIRED_SHARE_MAX * rows:
         raise refused(
             drive.measured.path, faults,
             f"{lines} of {rows} lines are more than the {_REPAIRED_SHARE_MAX:.0%} that --repair changes; correct "
             "the file, or check the columns and their units" + _rates(drive),
         )  # fmt: skip
-    return mended, faults.texts()
+    return Sound(mended, faults, tuple(said), long_gaps)
 
 
 def _rates(drive: Drive) -> str:
@@ -56,41 +75,10 @@ def _rates(drive: Drive) -> str:
     )
 
 
-def _repaired(drive: Drive, faults: Faults) -> Drive:
-    """The drive after the repairs.
-
-    A clock that passes midnight runs on; lines with a time out of order are left out; speeds below 0 are set to 0,
-    missing ones, spikes and gaps drawn straight between their neighbours; other columns hold their last value.
-    """
-    drive = past_midnight(drive, faults)
-    kept = times_in_order(drive, faults)
-    if len(kept) < 2:
-        raise DataError(f"{drive.measured.path}: one line; a drive needs at least 2")
-    if kept.sum() < 2:
-        advice = "fewer than 2 lines have a time in order; a drive needs at least 2: check the column of time"
-        raise refused(drive.measured.path, faults, advice)
-    drive = _rows_of(drive, kept)
-    report_gaps(drive, faults)
-    speed_mps = _speeds(drive, faults)
-    return replace(drive, speed_mps=speed_mps, **held_columns(drive, faults))
-
-
 def held_columns(drive: Drive, faults: Faults) -> dict[str, Array | None]:
     """Grade, altitude, gear and clutch: a fault takes the value before it, or at the start the one after."""
     names = ("grade", "altitude_m", "gear", "clutch_open")
     return {name: _held(drive, name, faults) for name in names}
-
-
-def _rows_of(drive: Drive, kept: NDArray[np.bool_]) -> Drive:
-    names = ("lines", "time_s", "speed_mps", "grade", "altitude_m", "gear", "clutch_open")
-    part = {n: values[kept] for n in names if (values := getattr(drive, n)) is not None}
-    rows = np.flatnonzero(kept)
-    text = {
-        (role, int(np.searchsorted(rows, row))): cell
-        for (role, row), cell in drive.text.items()
-        if kept[row]
-    }
-    return replace(drive, text=text, **part)
 
 
 def _speeds(drive: Drive, faults: Faults) -> Array:

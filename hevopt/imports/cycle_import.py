@@ -1,226 +1,168 @@
-"""A logged drive or another tool's cycle to a cycle file at 1 Hz, with all that was assumed and changed."""
+"""A logged drive or another tool's cycle to cycle files at 1 Hz."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from hashlib import sha256
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hevopt import __version__
-from hevopt.cycle import SAMPLES_MAX, Cycle, cycle_of
-from hevopt.errors import DataError
-from hevopt.files import printable
-from hevopt.imports.altitude import grade_from_altitude
+from hevopt.errors import DataError, unknown_name
 from hevopt.imports.cycle_columns import Drive, drive_of
 from hevopt.imports.cycle_distance import over_time
-from hevopt.imports.cycle_faults import sound
+from hevopt.imports.cycle_fault_list import Faults, refused
+from hevopt.imports.cycle_faults import Sound, sound
+from hevopt.imports.cycle_gaps import (
+    GAPS,
+    bridged,
+    check_cut,
+    gap_text,
+    gap_texts,
+    gaps_unsaid,
+    joined,
+    moving_ends,
+    parts_of,
+)
+from hevopt.imports.cycle_sampled import Imported, Told, cycle_from, with_grade
 from hevopt.imports.cycle_standstill import never_at_rest, standing
-from hevopt.imports.cycle_times import coarse, long_steps
+from hevopt.imports.cycle_times import DROPOUT_MAX_S, coarse, long_steps
 from hevopt.imports.measured import read_measured
-from hevopt.imports.resample import (
-    distance_at,
-    mean_grades,
-    one_hertz_times,
-    rows_at,
-    speeds_at,
-)
-from hevopt.units import KMH_PER_MPS
-
-Array = NDArray[np.float64]
-
-RULE = (
-    "1 Hz: speed linear between samples, at each whole second scaled so that the distance of the two seconds "
-    "around it is kept; standstill stays standstill; the last step, 0.5 to 1.5 s long, ends at the file's last time"
-)
-_ALREADY = "already at 1 Hz: speeds kept as they are"
-_TIME_DIGITS, _SPEED_DIGITS, _GRADE_DIGITS = 6, 6, 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Imported:
-    """A cycle made from a file, with texts for the user.
-
-    text: the cycle file; assumptions: how the file was read; rules: how the cycle was made; repairs: by line
-    distance_m: as the source has it after the repairs, between samples at uneven times
-    hints: what the user may want to change
-    """
-
-    source: Path
-    cycle: Cycle
-    text: str
-    distance_m: float
-    assumptions: tuple[str, ...]
-    rules: tuple[str, ...]
-    repairs: tuple[str, ...]
-    hints: tuple[str, ...]
+def import_cycle(path: Path, **options: Any) -> Imported:
+    """The one cycle in a measured file; options as of `import_drives`."""
+    (imported,) = import_drives(path, **options)
+    return imported
 
 
-def import_cycle(
+def import_drives(
     path: Path,
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     sheet: str | None = None,
     repair: bool = False,
+    gaps: str | None = None,
     acceleration_mps2: float | None = None,
     standstill_mps: float | None = None,
     altitude_baseline_m: float | None = None,
-) -> Imported:
-    """The cycle in a measured file; DataError with every fault by line where it has any and `repair` is not set.
+) -> tuple[Imported, ...]:
+    """The cycle in a measured file, or its trips where gaps is "split".
 
-    columns, units: role (time, speed, distance, stop, grade, altitude, gear, clutch_open) to a column's name, unit
+    Raises DataError with every fault by line where the file has any and `repair` is not set.
+    columns, units: role (time, date, speed, distance, stop, grade, altitude, gear, clutch_open) to a column's name,
+    unit
     acceleration_mps2: with which the target speeds of a drive over distance are followed
     altitude_baseline_m: length of road over which grade is taken from altitude, None for one chosen by its noise
     standstill_mps: slower than which for a while the car counts as standing
+    gaps: cut, split or bridge those of more than a minute
     """
     measured = read_measured(path, sheet=sheet)
     drive = drive_of(measured, columns or {}, units or {})
-    hints: list[str] = []
+    _check_options(drive, gaps, acceleration_mps2, standstill_mps, altitude_baseline_m)
+    made = _Making(path, standstill_mps, altitude_baseline_m)
     if drive.time_s is None:
-        if standstill_mps is not None:
-            raise DataError(f"{measured.path}: a drive over distance; leave --standstill out")
-        drive, repairs, changes = over_time(drive, acceleration_mps2), [], []
-        distance_m = _distance(drive)[-1]
+        drive = over_time(drive, acceleration_mps2)
+        return (cycle_from(path, drive, Told(hints=drive.hints), altitude_baseline_m),)
+    found = sound(drive)
+    unsaid = len(found.long_gaps) > 0 and gaps is None
+    if unsaid or (found.faults.found and not repair):
+        raise _refusal(found, made, repair, gaps)
+    return made.cycles(found, gaps)
+
+
+def _check_options(
+    drive: Drive,
+    gaps: str | None,
+    acceleration_mps2: float | None,
+    standstill_mps: float | None,
+    altitude_baseline_m: float | None,
+) -> None:
+    """DataError for an option that the file leaves without a meaning."""
+    path = drive.measured.path
+    if gaps is not None and gaps not in GAPS:
+        raise unknown_name("--gaps", gaps, list(GAPS))
+    if drive.time_s is None:
+        for option, value in (("--standstill", standstill_mps), ("--gaps", gaps)):
+            if value is not None:
+                raise DataError(f"{path}: a drive over distance; leave {option} out")
     elif acceleration_mps2 is not None:
-        raise DataError(f"{measured.path}: a drive over time; leave --acceleration out")
-    else:
-        drive, repairs = sound(drive, repair)
-        changes, hints = long_steps(drive), coarse(drive)
-        distance_m = _distance(drive)[-1]
-        if standstill_mps is None:
-            hints += never_at_rest(drive)
-        else:
-            drive, counted = standing(drive, standstill_mps)
-            changes += counted
+        raise DataError(f"{path}: a drive over time; leave --acceleration out")
     if altitude_baseline_m is not None and drive.altitude_m is None:
         raise DataError(
-            f"{measured.path}: --altitude-baseline without an altitude; name it with --column altitude=NAME"
+            f"{path}: --altitude-baseline without an altitude; name it with --column altitude=NAME"
         )
-    sampled, rules, noticed = _at_one_hertz(drive, altitude_baseline_m)
-    hints = [*hints, *noticed]
-    assumptions, rules = (*measured.notes, *drive.notes), (*rules, *changes)
-    told = [*(f"read as: {text}" for text in assumptions), *(f"made by: {text}" for text in rules)]
-    text = _text(path, measured.path, told + hints, repairs, sampled)
-    cycle = _checked(measured.path, text)
-    return Imported(
-        measured.path, cycle, text, float(distance_m), assumptions, rules, tuple(repairs), tuple(hints)
-    )  # fmt: skip
 
 
-def summary(imported: Imported) -> list[tuple[str, str]]:
-    """Name and text of each figure that tells whether a cycle was read as meant."""
-    cycle = imported.cycle
-    speed, step_s = cycle.speed_mps, np.diff(cycle.time_s)
-    rests = (speed[1:] == 0) & (speed[:-1] == 0)
-    stops = int(np.sum((speed[1:] == 0) & (speed[:-1] > 0)))
-    acceleration = np.diff(speed) / step_s
-    up, down = max(acceleration.max(), 0.0), abs(min(acceleration.min(), 0.0))
-    change = round(cycle.distance_m / imported.distance_m - 1, 6) + 0.0
-    whose = "repaired drive's" if imported.repairs else "file's"
-    rows = [
-        ("samples", f"{len(speed)}"),
-        ("duration", f"{cycle.duration_s:.10g} s"),
-        ("distance", f"{cycle.distance_m / 1e3:.4f} km ({change:+.4%} of the {whose})"),
-        ("max speed", f"{speed.max() * KMH_PER_MPS:.1f} km/h"),
-        ("max acceleration", f"{up:.2f} m/s², braking {down:.2f} m/s²"),
-        ("stops", f"{stops}"),
-        ("standstill", f"{np.sum(step_s[rests]) / cycle.duration_s:.1%} of the time"),
-    ]
-    if cycle.grade.any():
-        climb_m = (
-            cycle.grade[:-1] / np.hypot(1, cycle.grade[:-1]) * step_s * (speed[1:] + speed[:-1]) / 2
+def _refusal(found: Sound, made: "_Making", repair: bool, gaps: str | None) -> DataError:
+    """The error that lists faults and gaps, with advice that has been tried: what it names will not be refused."""
+    faults, advice = Faults() if repair else found.faults, []
+    asked = len(found.long_gaps) and gaps is None
+    if faults.found:
+        try:
+            made.cycles(found, "split" if asked else gaps)
+            advice.append("correct the file, or let --repair mend these lines as told")
+        except DataError as error:
+            advice.append(f"correct the file; --repair does not help, since then: {error}")
+    if asked:
+        faults = Faults([*faults.found])
+        for k in found.long_gaps:
+            faults.add(found.drive.lines[k + 1], "long gaps", "{}", gap_text(found.drive, k))
+        advice.append(gaps_unsaid(found.drive, found.long_gaps))
+    return refused(found.drive.measured.path, faults, "\n".join(advice))
+
+
+@dataclass(frozen=True, slots=True)
+class _Making:
+    """How cycles are made of sound drives."""
+
+    path: Path
+    standstill_mps: float | None
+    altitude_baseline_m: float | None
+
+    def cycles(self, found: Sound, gaps: str | None) -> tuple[Imported, ...]:
+        """The cycles of a drive, with its long gaps dealt with as told."""
+        drive, rows = found.drive, found.long_gaps
+        hints = (*drive.hints, *coarse(drive))
+        told = Told(found.said, tuple(found.faults.texts()), hints)
+        if not len(rows):
+            nothing = f"--gaps {gaps}: no gap of more than {DROPOUT_MAX_S:g} s"
+            return (self._cycle(drive, _with(told, [nothing] * (gaps is not None))),)
+        if gaps == "bridge":
+            return (self._cycle(drive, _with(told, [bridged(drive, rows)])),)
+        parts = parts_of(drive, rows)
+        told = _with(told, parts.said, moving_ends(parts.drives, gaps == "cut"))
+        where = "; ".join(gap_texts(drive, rows))
+        if gaps == "cut":
+            check_cut(drive, rows)
+            told = _with(told, [f"gaps cut out, their time and distance left out: {where}"])
+            return (self._joined(parts.drives, told),)
+        return tuple(
+            self._cycle(part, _with(told, [_trip(k, parts.drives), f"gaps: {where}"]))
+            for k, part in enumerate(parts.drives, start=1)
         )
-        up, down = climb_m[climb_m > 0].sum(), abs(climb_m[climb_m < 0].sum())
-        rows.append(("grade", f"{up:.1f} m up, {down:.1f} m down"))
-    if cycle.gear is not None:
-        rows.append(("gears", f"0 to {cycle.gear.max()}"))
-    return rows
+
+    def _joined(self, parts: tuple[Drive, ...], told: Told) -> Imported:
+        """One cycle of all parts, each with the grade of its own altitude."""
+        graded = [with_grade(part, self.altitude_baseline_m) for part in parts]
+        for _, of_part in graded:
+            told = _with(told, of_part.rules, of_part.hints)
+        return self._cycle(joined(tuple(part for part, _ in graded)), told)
+
+    def _cycle(self, drive: Drive, told: Told) -> Imported:
+        told = _with(told, long_steps(drive))
+        if self.standstill_mps is None:
+            told = _with(told, hints=never_at_rest(drive))
+        else:
+            drive, counted = standing(drive, self.standstill_mps)
+            told = _with(told, counted)
+        return cycle_from(self.path, drive, told, self.altitude_baseline_m)
 
 
-def _distance(drive: Drive) -> Array:
-    return distance_at(drive.time_s, drive.speed_mps, drive.time_s)
+def _with(told: Told, rules: Iterable[str] = (), hints: Iterable[str] = ()) -> Told:
+    """What is told, with more that does not stand there yet."""
+    rules = tuple(dict.fromkeys((*told.rules, *rules)))
+    return replace(told, rules=rules, hints=tuple(dict.fromkeys((*told.hints, *hints))))
 
 
-def _at_one_hertz(
-    drive: Drive, altitude_baseline_m: float | None
-) -> tuple[dict[str, Array], list[str], list[str]]:
-    """Columns of the cycle file, the rules by which they were made, and hints."""
-    start_s = float(drive.time_s[0])
-    time_s = drive.time_s - start_s
-    duration_s = round(float(time_s[-1]), _TIME_DIGITS)
-    if duration_s > SAMPLES_MAX - 1:
-        raise DataError(
-            f"{drive.measured.path}: {duration_s:g} s long; allowed: up to {SAMPLES_MAX - 1} s, in 1 s steps; "
-            "check the unit of time, or cut the drive"
-        )
-    at_s = one_hertz_times(float(time_s[-1]))
-    columns = {"time_s": at_s, "speed_mps": speeds_at(time_s, drive.speed_mps, at_s)}
-    already = len(at_s) == len(time_s) and np.allclose(at_s, time_s, rtol=0, atol=10**-_TIME_DIGITS)
-    rules = [_ALREADY if already else f"{RULE}; steps of the file: {_steps(time_s)}"]
-    if abs(start_s) > 10**-_TIME_DIGITS:
-        rules.append(f"time begins at 0: {start_s:.10g} s subtracted")
-    row = rows_at(time_s, at_s)
-    for name in ("gear", "clutch_open"):
-        if (values := getattr(drive, name)) is not None:
-            columns[name] = values[row]
-            rules.append(f"{name}: the last sample's")
-    grade, hints = drive.grade, []
-    if drive.altitude_m is not None:
-        road = grade_from_altitude(_distance(drive), drive.altitude_m, altitude_baseline_m)
-        grade = road.grade
-        rules.append(road.rule)
-        hints += [road.hint] * bool(road.hint)
-    elif drive.grade_ends:
-        grade = np.append(grade[1:], grade[-1])
-    if grade is not None:
-        columns["grade"] = mean_grades(time_s, drive.speed_mps, grade, at_s)
-        holds = (
-            "over the step that ends at it (FASTSim convention)"
-            if drive.grade_ends
-            else "to the next"
-        )
-        rules.append(f"grade: each row's holds {holds}; mean over the distance of each second")
-    return columns, rules, hints
-
-
-def _steps(time_s: Array) -> str:
-    steps_s = np.diff(time_s)
-    return f"{len(steps_s)}, of {steps_s.min():.4g} to {steps_s.max():.4g} s"
-
-
-def _text(
-    path: Path, shown: Path, told: list[str], repairs: list[str], columns: dict[str, Array]
-) -> str:
-    """The cycle file: comments with source, assumptions and every repair, then the columns."""
-    digest = sha256(path.read_bytes()).hexdigest()
-    comments = [
-        f"Made by hevopt {__version__} from {shown.name}, sha256 {digest}.",
-        *told,
-        *([f"{len(repairs)} repairs, by line of that file:"] if repairs else []),
-        *(f"  {text}" for text in repairs),
-    ]
-    lines = [f"# {printable(comment)}" for comment in comments]
-    lines.append(",".join(columns))
-    for row in zip(*(_written(name, values) for name, values in columns.items()), strict=True):
-        lines.append(",".join(row))
-    return "\n".join(lines) + "\n"
-
-
-def _written(name: str, values: Array) -> list[str]:
-    digits = {"time_s": _TIME_DIGITS, "speed_mps": _SPEED_DIGITS, "grade": _GRADE_DIGITS}.get(
-        name, 0
-    )
-    return [
-        f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
-        for value in values + 0.0
-    ]
-
-
-def _checked(path: Path, text: str) -> Cycle:
-    """The cycle as it will be read; DataError where the reader of cycles would refuse it."""
-    try:
-        return cycle_of(path.with_suffix(".csv"), text)
-    except DataError as error:
-        raise DataError(f"the cycle made from {path.name} cannot be used: {error}") from None
+def _trip(k: int, parts: tuple[Drive, ...]) -> str:
+    lines = parts[k - 1].lines
+    return f"trip {k} of {len(parts)}, lines {lines[0]} to {lines[-1]}"

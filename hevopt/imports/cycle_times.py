@@ -1,7 +1,8 @@
-"""Times of a logged drive: their order, clocks that pass midnight, gaps and long steps.
+"""Times of a logged drive: their order, clocks that begin again, gaps and long steps.
 
-A gap is more than five usual steps without a sample, and more than 2 s; steps of
-more than three usual ones are told.
+A clock begins again after a day, after half a day where it shows 12 hours, and after an hour where it shows minutes
+and seconds alone or is set back to winter time. A gap is more than five usual steps without a sample, and more than
+2 s; one of more than a minute is no dropout. Steps of more than three usual ones are told.
 """
 
 from bisect import bisect_left
@@ -10,41 +11,98 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.imports.clock_ticks import SAME_TIME_S, spread_evenly, ticks_of
 from hevopt.imports.cycle_columns import Drive
 from hevopt.imports.cycle_fault_list import Faults, empty_cell
 from hevopt.imports.measured_cells import LISTED
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
+DROPOUT_MAX_S = 60.0
 _GAP_STEPS, _GAP_MIN_S = 5.0, 2.0
 _LONG_STEPS = 3.0
 _USUAL_MAX_S = 10.0
-_DAY_S = 86400.0
-_SAME_TIME_S = 1e-6
+_AGAIN = "clocks that begin again"
+# What a clock leaves out, between what it then stays, and why.
+_FOLDS = (
+    (86400.0, (0.0, 86400.0), "the clock passes midnight"),
+    (43200.0, (0.0, 46800.0), "the clock of 12 hours begins again"),
+    (3600.0, (-np.inf, np.inf), "the clock goes through the hour again"),
+)
 
 
-def past_midnight(drive: Drive, faults: Faults) -> Drive:
-    """The drive with a day added where a clock begins again at 0; every such line is a fault."""
+def running_on(drive: Drive, faults: Faults) -> Drive:
+    """The drive with a day, half a day or an hour added where a clock begins again; every such line is a fault."""
     rows = np.flatnonzero(np.isfinite(drive.time_s))
     time_s = drive.time_s[rows]
     steps_s = np.diff(time_s)
-    falls = np.flatnonzero(steps_s < -_DAY_S / 2)
-    in_a_day = not ((time_s < 0) | (time_s >= _DAY_S)).any()
-    if not len(falls) or not in_a_day or (steps_s > _DAY_S / 2).any():
+    falls = np.flatnonzero(steps_s < -_FOLDS[-1][0] / 2)
+    if not len(falls):
         return drive
     limit_s = _gap_limit_s(steps_s[steps_s > 0])
-    if not (steps_s[falls] + _DAY_S <= limit_s).all():
+    folds = [_fold(time_s, steps_s, k, limit_s) for k in falls]
+    if None in folds:
         return drive
-    for k in falls:
-        faults.add(
-            drive.lines[rows[k + 1]], "clocks past midnight",
-            "time {:g} s after {:g} s: the clock passes midnight; a day, {:g} s, is added from here on",
-            time_s[k + 1], time_s[k], _DAY_S,
-        )  # fmt: skip
     mended = drive.time_s.copy()
-    for k in falls:
-        mended[rows[k + 1] :] += _DAY_S
+    for k, (fold_s, why) in zip(falls, folds, strict=True):
+        faults.add(
+            drive.lines[rows[k + 1]], _AGAIN,
+            "time {:g} s after {:g} s: {}; {:g} s are added from here on",
+            time_s[k + 1], time_s[k], why, fold_s,
+        )  # fmt: skip
+        mended[rows[k + 1] :] += fold_s
     return replace(drive, time_s=mended)
+
+
+def _fold(time_s: Array, steps_s: Array, k: int, limit_s: float) -> tuple[float, str] | None:
+    """What a clock that falls after row k leaves out, and why; None where a row is out of order instead.
+
+    A clock that begins again goes on with a usual step, and no step leads back up.
+    """
+    for fold_s, (low_s, high_s), why in _FOLDS:
+        inside = time_s.min() >= low_s and time_s.max() < high_s
+        up = (steps_s > fold_s / 2) & (steps_s <= fold_s + limit_s)
+        if 0 < steps_s[k] + fold_s <= limit_s and inside and not up.any():
+            return fold_s, why
+    return None
+
+
+def spread(drive: Drive) -> tuple[Drive, list[str]]:
+    """The drive with the rows of each moment of a coarse clock spread evenly over it, and what was done.
+
+    Where all rows of a moment are alike, one of them is left.
+    """
+    ticks = ticks_of(drive.time_s)
+    if ticks is None:
+        return drive, []
+    if _all_alike(drive, ticks.begins, ticks.counts):
+        kept = np.zeros(len(drive.time_s), dtype=bool)
+        kept[ticks.begins] = True
+        return rows_of(drive, kept), [f"{ticks.told()} and are alike: one of them is kept"]
+    made = f"{ticks.told()} and are spread evenly over it, {ticks.usual} as a rule"
+    return replace(drive, time_s=spread_evenly(drive.time_s, ticks)), [made]
+
+
+def _all_alike(drive: Drive, begins: Rows, counts: Rows) -> bool:
+    """Whether the rows of every moment hold the same values."""
+    names = ("speed_mps", "grade", "altitude_m", "gear", "clutch_open")
+    columns = [values for name in names if (values := getattr(drive, name)) is not None]
+    first = np.repeat(begins, counts)
+    return all(np.array_equal(values, values[first], equal_nan=True) for values in columns)
+
+
+def rows_of(drive: Drive, kept: NDArray[np.bool_]) -> Drive:
+    """The drive with some of its rows alone."""
+    names = ("lines", "time_s", "speed_mps", "grade", "altitude_m", "gear", "clutch_open")
+    part = {n: values[kept] for n in names if (values := getattr(drive, n)) is not None}
+    rows = np.flatnonzero(kept)
+    text = {
+        (role, int(np.searchsorted(rows, row))): cell
+        for (role, row), cell in drive.text.items()
+        if kept[row]
+    }
+    return replace(drive, text=text, **part)
 
 
 def times_in_order(drive: Drive, faults: Faults) -> NDArray[np.bool_]:
@@ -56,14 +114,14 @@ def times_in_order(drive: Drive, faults: Faults) -> NDArray[np.bool_]:
         faults.add(lines[row], "without a time", "time {}; the line is left out", what)
     kept = np.zeros(len(time_s), dtype=bool)
     kept[known] = True
-    if (np.diff(time_s[known]) > _SAME_TIME_S).all():
+    if (np.diff(time_s[known]) > SAME_TIME_S).all():
         return kept
     series = known[_longest_increasing(time_s[known])]
     kept[:] = False
     kept[series] = True
     for row in np.flatnonzero(np.isfinite(time_s) & ~kept):
         before = series[max(np.searchsorted(series, row) - 1, 0)]
-        same = abs(time_s[row] - time_s[before]) <= _SAME_TIME_S
+        same = abs(time_s[row] - time_s[before]) <= SAME_TIME_S
         kind, how = (
             ("duplicate times", "stands twice")
             if same
@@ -82,7 +140,7 @@ def _longest_increasing(values: Array) -> list[int]:
     last: list[int] = []
     before = [-1] * len(values)
     for i, value in enumerate(values.tolist()):
-        place = bisect_left(ends, value - _SAME_TIME_S)
+        place = bisect_left(ends, value - SAME_TIME_S)
         before[i] = last[place - 1] if place else -1
         if place == len(ends):
             ends.append(value)
@@ -96,16 +154,18 @@ def _longest_increasing(values: Array) -> list[int]:
     return series[::-1]
 
 
-def report_gaps(drive: Drive, faults: Faults) -> None:
-    """Add every gap to the faults."""
+def report_gaps(drive: Drive, faults: Faults) -> Rows:
+    """Add every dropout to the faults; the rows after which there is a gap of more than a minute."""
     steps_s = np.diff(drive.time_s)
     limit_s = _gap_limit_s(steps_s)
-    for row in np.flatnonzero(steps_s > limit_s):
+    long = steps_s > max(limit_s, DROPOUT_MAX_S)
+    for row in np.flatnonzero((steps_s > limit_s) & ~long):
         faults.add(
             drive.lines[row + 1], "gaps",
             "{:g} s without a sample before {:g} s (limit {:g} s); the speed is drawn straight across",
             steps_s[row], drive.time_s[row + 1], limit_s,
         )  # fmt: skip
+    return np.flatnonzero(long)
 
 
 def _gap_limit_s(steps_s: Array) -> float:

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from hevopt import build_problem, load_architecture, load_cycle
 from hevopt.demand import demand_of
 from hevopt.errors import DataError
-from hevopt.imports.cycle_import import import_cycle, summary
+from hevopt.imports.cycle_import import import_cycle
+from hevopt.imports.cycle_sampled import summary
 from hevopt.imports.resample import one_hertz_times, speeds_at
 
 QUICK = settings(
@@ -372,7 +373,7 @@ def test_a_clock_that_passes_midnight_is_one_fault_whose_repair_goes_on(tmp_path
     clock = [f"{int(s) // 3600:02}:{int(s) // 60 % 60:02}:{int(s) % 60:02}" for s in clock]
     text = "time,speed_kmh\n" + "".join(f"{t},{v}\n" for t, v in zip(clock, DRIVE_KMH, strict=True))
     message = refusal(tmp_path, text)
-    assert "1 fault (1 clocks past midnight)" in message
+    assert "1 fault (1 clocks that begin again)" in message
     assert "line 7: time 0 s after 86399 s: the clock passes midnight" in message
     cycle = imported(tmp_path, text, repair=True).cycle
     assert cycle.duration_s == 15

@@ -8,7 +8,8 @@ import pytest
 
 from hevopt import build_problem, load_architecture, load_cycle
 from hevopt.errors import DataError
-from hevopt.imports.cycle_import import import_cycle, summary
+from hevopt.imports.cycle_import import import_cycle
+from hevopt.imports.cycle_sampled import summary
 from hevopt.imports.cycle_standstill import standstill_limit
 
 HALF_KMH = 0.5 / 3.6
