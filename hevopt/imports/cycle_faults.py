@@ -10,7 +10,15 @@ from hevopt.errors import DataError
 from hevopt.imports.cycle_columns import Drive
 from hevopt.imports.cycle_fault_list import Faults, empty_cell, refused
 from hevopt.imports.cycle_spikes import spikes, text_of
-from hevopt.imports.cycle_times import report_gaps, rows_of, running_on, spread, times_in_order
+from hevopt.imports.cycle_times import (
+    report_gaps,
+    rows_of,
+    running_on,
+    spread,
+    times_in_order,
+    without_speed,
+)
+from hevopt.imports.measured_rows import runs
 from hevopt.units import KMH_PER_MPS
 
 Array = NDArray[np.float64]
@@ -20,6 +28,8 @@ SMALLEST_MPS = 1e-3
 _GEAR_MAX = 20
 # A file with more to repair than this share of its lines is not a log with a few faults.
 _REPAIRED_SHARE_MAX = 0.25
+_DRAWN = "drawn between its neighbours"
+_LEFT_OUT = "left out with more than a minute without a usable speed"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +50,8 @@ def sound(drive: Drive) -> Sound:
     """The drive after the repairs; DataError where too many of its lines would change.
 
     A clock that begins again runs on; lines with a time out of order are left out; speeds below 0 are set to 0,
-    missing ones, spikes and dropouts drawn straight between their neighbours; other columns hold their last value.
+    missing ones, spikes and dropouts drawn straight between their neighbours, up to a minute of them; other columns
+    hold their last value.
     """
     faults = Faults()
     mended, said = spread(running_on(drive, faults))
@@ -50,10 +61,9 @@ def sound(drive: Drive) -> Sound:
     if kept.sum() < 2:
         advice = "fewer than 2 lines have a time in order; a drive needs at least 2: check the column of time"
         raise refused(drive.measured.path, faults, advice)
-    mended = rows_of(mended, kept)
+    mended, more = _speeds(rows_of(mended, kept), faults)
     long_gaps = report_gaps(mended, faults)
-    speed_mps = _speeds(mended, faults)
-    mended = replace(mended, speed_mps=speed_mps, **held_columns(mended, faults))
+    mended = replace(mended, **held_columns(mended, faults))
     lines, rows = len({fault[0] for fault in faults.found}), len(drive.lines)
     if lines > _REPAIRED_SHARE_MAX * rows:
         raise refused(
@@ -61,7 +71,7 @@ def sound(drive: Drive) -> Sound:
             f"{lines} of {rows} lines are more than the {_REPAIRED_SHARE_MAX:.0%} that --repair changes; correct "
             "the file, or check the columns and their units" + _rates(drive),
         )  # fmt: skip
-    return Sound(mended, faults, tuple(said), long_gaps)
+    return Sound(mended, faults, (*said, *more), long_gaps)
 
 
 def _rates(drive: Drive) -> str:
@@ -81,35 +91,38 @@ def held_columns(drive: Drive, faults: Faults) -> dict[str, Array | None]:
     return {name: _held(drive, name, faults) for name in names}
 
 
-def _speeds(drive: Drive, faults: Faults) -> Array:
+def _speeds(drive: Drive, faults: Faults) -> tuple[Drive, list[str]]:
+    """The drive with usable speeds alone, without its stretches of more than a minute that have none."""
     speed, lines = drive.speed_mps.copy(), drive.lines
-    for row in np.flatnonzero(~np.isfinite(speed)):
-        what = empty_cell(drive, "speed", row)
-        faults.add(lines[row], "without a speed", "speed {}; drawn between its neighbours", what)
-    negative = speed < 0
+    missing, negative = ~np.isfinite(speed), speed < 0
     speed = np.where(negative, 0.0, speed)
-    kept = np.isfinite(speed)
-    for row in np.flatnonzero(speed > SPEED_MAX_MPS):
-        text = "speed {:.4g} km/h is above {:g} km/h; drawn between its neighbours"
-        faults.add(
-            lines[row],
-            "speeds too high",
-            text,
-            *(np.array([speed[row], SPEED_MAX_MPS]) * KMH_PER_MPS),
-        )
-    kept &= ~(speed > SPEED_MAX_MPS)
-    for spike in spikes(drive.time_s, speed, np.flatnonzero(kept)):
-        kept[spike.row] = False
+    high = speed > SPEED_MAX_MPS
+    kept = ~missing & ~high
+    wild = spikes(drive.time_s, speed, np.flatnonzero(kept))
+    kept[[spike.row for spike in wild]] = False
+    gone = without_speed(drive.time_s, kept)
+    for row in np.flatnonzero(missing & ~gone):
+        what = empty_cell(drive, "speed", row)
+        faults.add(lines[row], "without a speed", f"speed {{}}; {_DRAWN}", what)
+    for row in np.flatnonzero(high):
+        text = f"speed {{:.4g}} km/h is above {{:g}} km/h; {_LEFT_OUT if gone[row] else _DRAWN}"
+        values = np.array([speed[row], SPEED_MAX_MPS]) * KMH_PER_MPS
+        faults.add(lines[row], "speeds too high", text, *values)
+    for spike in wild:
         if not negative[spike.row]:
             text, values = text_of(spike, drive.time_s, speed, lines)
+            text += f"; {_LEFT_OUT if gone[spike.row] else _DRAWN}"
             faults.add(lines[spike.row], "spikes", text, *values)
     for row in np.flatnonzero(negative):
-        how = (
-            "set to 0" if kept[row] else "drawn between its neighbours, against which 0 is a spike"
-        )
+        drawn = f"{_LEFT_OUT if gone[row] else _DRAWN}, against which 0 is a spike"
+        how = "set to 0" if kept[row] else drawn
         text = "speed {:.4g} km/h is negative; {}"
         faults.add(lines[row], "negative speeds", text, drive.speed_mps[row] * KMH_PER_MPS, how)
-    return np.interp(drive.time_s, drive.time_s[kept], speed[kept]) if kept.any() else speed
+    if kept.any():
+        speed = np.interp(drive.time_s, drive.time_s[kept], speed[kept])
+    empty = lines[missing & gone].tolist()
+    said = [f"more than a minute without a speed, left out: {runs(empty)}"] * bool(empty)
+    return rows_of(replace(drive, speed_mps=speed), ~gone), said
 
 
 def _held(drive: Drive, name: str, faults: Faults) -> Array | None:

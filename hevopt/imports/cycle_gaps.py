@@ -1,4 +1,4 @@
-"""Gaps of more than a minute in a logged drive, which are no dropouts: what becomes of them is for the user to say.
+"""Gaps of more than a minute in a logged speed are no dropouts: what becomes of them is for the user to say.
 
 cut: the parts before and after are joined without the time of the gap. Their two samples there become one, whose
 speed v is such that h (v - v1) + k (v - v2) = 0 for the steps h before and k after it: as the speed is linear
@@ -66,7 +66,7 @@ def gap_text(drive: Drive, k: int) -> str:
     """How long the gap after row k lasts, and how fast the car is before and after it."""
     before, after = drive.speed_mps[k : k + 2] * KMH_PER_MPS
     step_s = drive.time_s[k + 1] - drive.time_s[k]
-    return f"{_long(step_s)} without a sample, {before:.3g} km/h before and {after:.3g} km/h after"
+    return f"{_long(step_s)} without a usable speed, {before:.3g} km/h before and {after:.3g} km/h after"
 
 
 def _long(seconds: float) -> str:

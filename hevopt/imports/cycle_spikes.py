@@ -142,13 +142,13 @@ def text_of(spike: Spike, time_s: Array, speed_mps: Array, lines: Rows) -> tuple
     """What a fault says of a spike, and what it is filled with; the jump of a piece stands in its first line."""
     if spike.row != spike.first:
         values = (speed_mps[spike.row] * KMH_PER_MPS, lines[spike.first])
-        return "speed {:.4g} km/h is off as line {} is; drawn between its neighbours", values
+        return "speed {:.4g} km/h is off as line {} is", values
     edge, other = spike.edge, spike.other
     step_s = abs(time_s[edge] - time_s[other])
     change_mps2 = abs(speed_mps[edge] - speed_mps[other]) / step_s
     text = (
         "speed {:.4g} km/h against {:.4g} km/h of line {}, {:.4g} s apart: {:.3g} m/s², more than tyres hold "
-        "({:.2f} m/s²); drawn between its neighbours"
+        "({:.2f} m/s²)"
     )
     filled = (
         speed_mps[edge] * KMH_PER_MPS, speed_mps[other] * KMH_PER_MPS, lines[other], step_s, change_mps2,

@@ -154,6 +154,19 @@ def _longest_increasing(values: Array) -> list[int]:
     return series[::-1]
 
 
+def without_speed(time_s: Array, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(row,) rows of stretches without a usable speed that last longer than a dropout, up to their neighbours."""
+    gone = np.zeros(len(time_s), dtype=bool)
+    if not usable.any():
+        return gone
+    limit_s = max(_gap_limit_s(np.diff(time_s)), DROPOUT_MAX_S)
+    edges = np.flatnonzero(np.diff(np.r_[True, usable, True].astype(int)))
+    for first, after in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if time_s[min(after, len(time_s) - 1)] - time_s[max(first - 1, 0)] > limit_s:
+            gone[first:after] = True
+    return gone
+
+
 def report_gaps(drive: Drive, faults: Faults) -> Rows:
     """Add every dropout to the faults; the rows after which there is a gap of more than a minute."""
     steps_s = np.diff(drive.time_s)

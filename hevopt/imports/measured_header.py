@@ -40,7 +40,11 @@ def header_of(head: list[Row], start: int, width: int) -> Header:
         return Header(numbered, [()] * width, None, [], ["no header: columns by number"])
     units_at, units = _units_place(above)
     line, cells = next(row for row in reversed(above) if row[0] != units_at)
-    more = [row for row in above if row[0] not in (line, units_at) and _names_too(row[1])]
+    more: list[Row] = []
+    for row in reversed([row for row in above if row[0] not in (line, units_at)]):
+        if not _names_too(row[1]):
+            break
+        more.insert(0, row)
     notes = [f"header in line {line}"]
     if units_at is not None:
         notes.append(f"units row in line {units_at}")

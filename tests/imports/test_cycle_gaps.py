@@ -27,7 +27,8 @@ def test_hours_parked_are_no_dropout_and_what_can_be_done_is_offered(repair):
     message = str(error.value)
     assert "1 fault (1 long gaps)" in message
     assert (
-        "line 332: 29671 s (8 h 15 min) without a sample, 0 km/h before and 0 km/h after" in message
+        "line 332: 29671 s (8 h 15 min) without a usable speed, 0 km/h before and 0 km/h after"
+        in message
     )
     for offered in ("--gaps cut to join", "--gaps split for one", "--gaps bridge to draw"):
         assert offered in message
@@ -89,7 +90,7 @@ def test_speeds_that_no_car_joins_are_not_cut_and_that_is_not_offered(tmp_path):
     message = refusal(tmp_path, text)
     assert "--gaps cut" not in message and "--gaps split" in message
     assert (
-        "line 8: 495 s (8 min) without a sample, 80 km/h before and 0 km/h after: no car"
+        "line 8: 495 s (8 min) without a usable speed, 80 km/h before and 0 km/h after: no car"
         in refusal(tmp_path, text, gaps="cut")
     )
     trips = import_drives(tmp_path / "drive.csv", gaps="split")
@@ -217,3 +218,29 @@ def test_trips_are_written_beside_each_other(tmp_path, monkeypatch, capsys):
 def test_a_drive_over_distance_has_no_gaps(tmp_path):
     text = "<s>,<v>,<stop>\n0,0,3\n50,36,0\n100,0,5\n"
     assert "leave --gaps out" in refusal(tmp_path, text, "route.vdri", gaps="cut")
+
+
+@pytest.mark.parametrize("cell", ["", "400", "0"])
+def test_minutes_without_a_usable_speed_are_a_gap_and_never_drawn_across(tmp_path, cell):
+    rows = [f"{t},{cell if 200 <= t < 280 else 90}" for t in range(600)]
+    text = "\n".join(["time_s,speed_kmh", *rows])
+    message = refusal(tmp_path, text, repair=True)
+    assert (
+        "line 282: 81 s (1 min) without a usable speed, 90 km/h before and 90 km/h after" in message
+    )
+    result = imported(tmp_path, text, repair=True, gaps="cut")
+    assert result.cycle.duration_s == 598 - 80 and result.cycle.distance_m == pytest.approx(
+        518 * 25
+    )
+    if cell:
+        assert len(result.repairs) == 80 and "left out with more than a minute" in result.repairs[0]
+    else:
+        assert not result.repairs
+        assert "more than a minute without a speed, left out: lines 202-281" in result.text
+
+
+def test_a_log_that_waits_for_its_first_speed_begins_there(tmp_path):
+    rows = [f"{t},{90 if 70 <= t <= 200 else ''}" for t in range(270)]
+    result = imported(tmp_path, "\n".join(["time_s,speed_kmh", *rows]))
+    assert result.cycle.duration_s == 130 and result.cycle.distance_m == pytest.approx(130 * 25)
+    assert "without a speed, left out: lines 2-71, 203-271" in result.text

@@ -125,7 +125,9 @@ def test_the_only_columns_with_units_of_time_and_speed_are_taken_and_others_aske
 
 def test_date_and_time_in_two_columns_are_one_moment(tmp_path):
     path = LOGS / "date_and_time_split.csv"
-    with pytest.raises(DataError, match=r"line 22: 172801 s \(48 h 00 min\) without a sample"):
+    with pytest.raises(
+        DataError, match=r"line 22: 172801 s \(48 h 00 min\) without a usable speed"
+    ):
         import_cycle(path)
     assert import_cycle(path, gaps="bridge").cycle.duration_s == 172839
     assert import_cycle(path, columns={"date": ""}).cycle.duration_s == 39
