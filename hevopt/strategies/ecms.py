@@ -62,7 +62,8 @@ class _Search:
         control = choices.control[path]
         cost_kg, energy_j = total_cost_kg(self.problem, control)
         surplus = float(energy_j[-1]) - self.problem.end_min_j
-        if surplus >= -_ENERGY_ROUNDING * high and cost_kg < self.best_cost_kg:
+        enough = to_the_end or surplus >= -_ENERGY_ROUNDING * high
+        if enough and cost_kg < self.best_cost_kg:
             self.best_cost_kg, self.best_control = cost_kg, control
             self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
         return surplus
