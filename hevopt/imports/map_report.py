@@ -34,7 +34,7 @@ def _engine(imported: Imported, file: EngineFile) -> list[str]:
     said = [_extent(grid), *_engine_share(grid, imported.lines, envelope)]
     speed, torque = corners(grid, file)
     flow = grid.at(torque, speed)
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         efficiency = np.where(torque > 0, torque * speed / (flow * heat), np.nan)
     efficiency[~np.isfinite(efficiency)] = np.nan
     if np.isfinite(efficiency).any():
@@ -167,7 +167,8 @@ def _above_full_load(lines: Lines, file: EngineFile) -> list[str]:
     """A warning where the engine was measured well above its full-load curve."""
     points, full = lines.points, file.full_load
     limit = np.interp(points.speed_radps * RPM_PER_RADPS, full.speed_rpm, full.torque_nm)
-    over = points.torque_nm / limit
+    with np.errstate(over="ignore"):  # a curve of next to nothing
+        over = points.torque_nm / limit
     above = over > _ABOVE
     if not above.any():
         return []

@@ -186,6 +186,9 @@ def columns_table(path: Path, variables: Variables) -> Table:
 def cells_of(values: NDArray) -> Cells:
     """Numbers as a column's cells."""
     values = values.astype(float)
+    values[np.isnan(values)] = (
+        np.nan
+    )  # one kind of several, some of which raise flags where they are used
     strange = np.flatnonzero(np.abs(values) > LARGEST)
     texts = [(int(row), repr(float(values[row]))) for row in strange[:LISTED]]
     values[strange] = np.nan

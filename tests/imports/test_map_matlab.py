@@ -170,3 +170,12 @@ def test_a_program_of_matlab_gets_the_steps(tmp_path):
     path.write_text("fc_map_spd=[100 200]; % (rad/s)\nfc_map_trq=[10 20];\n")
     with pytest.raises(DataError, match="run it in MATLAB or Octave, and save what it made"):
         import_engine(Request(Source(path, None, {}, {}, None), {}, None, GIVEN))
+
+
+def test_numbers_that_no_bench_writes_raise_no_warning(tmp_path):
+    signalling = np.frombuffer(b"\1\0\0\0\0\0\xf0\x7f", "<f8")[0]
+    fuel = FUEL_GPS.copy()
+    fuel[2, 3], fuel[1, 1] = signalling, 1e-318
+    curve = {"max_torque_nm": FULL_NM * [1, 1e-310, 1, 1]}
+    report = coverage(engine(tmp_path, WHOLE | {"fuel_gps": fuel} | curve))
+    assert "holes: 1: 3000 rpm, 120 Nm" in report
