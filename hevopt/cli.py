@@ -19,6 +19,7 @@ from hevopt.commands import (
     studies,
     sweep,
 )
+from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError, HevoptError, SolverError
 
@@ -67,9 +68,7 @@ app.add_typer(mapping.maps_app, name="maps")
 
 def main() -> None:
     """Entry point: a user's mistake is one message on stderr and a status, never a traceback."""
-    # A terminal that lacks a letter of the report, such as Δ, shows "?" in its place.
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="replace")
+    keep_streams()
     status, message = 0, ""
     try:
         # An int where typer was left by typer.Exit, else what the command returned: None.
@@ -81,6 +80,10 @@ def main() -> None:
         status, message = error.exit_status, f"error: {error}"
     except OSError as error:
         status, message = DataError.exit_status, f"error: {error}"
+    except UnicodeEncodeError as error:
+        name = ascii(error.object[error.start : error.end])
+        status = DataError.exit_status
+        message = f"error: a name or text holds {name}, which is not UTF-8; rename the file"
     except MemoryError:
         status, message = (
             SolverError.exit_status,

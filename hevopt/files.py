@@ -165,6 +165,11 @@ def _as_in_toml(value: object) -> str:
     return repr(value)
 
 
+def encodable(text: str) -> str:
+    """The text as it can be written: bytes of a file name that are no UTF-8 as Python spells them, `\\udce9`."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 def printable(text: str) -> str:
     """The text with what a terminal could take for a command, such as a line end, as '?'."""
     return "".join(c if c.isprintable() else "?" for c in text)

@@ -113,6 +113,40 @@ def test_a_closed_pipe_is_not_an_error():
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-", "2>&1 | true"])
+@pytest.mark.parametrize(("words", "status"), [("strategies", 0), ("--help", 0), ("run nope", 2)])
+def test_closed_streams_change_neither_status_nor_what_the_others_get(closed, words, status):
+    program = f"{sys.executable} -c 'from hevopt.cli import main; main()'"
+    shell = ["bash", "-c", f"set -o pipefail; {program} {words} {closed}"]
+    done = subprocess.run(shell, capture_output=True, text=True)
+    assert done.returncode == status, done
+    assert ("not found" in done.stderr) == (status == 2 and closed == ">&-")
+    assert (done.stdout != "") == (status == 0 and closed == "2>&-")
+    assert "rror" not in done.stderr.replace("hevopt: error: ", "", 1)
+
+
+def test_files_are_written_though_nobody_reads_what_is_said(tmp_path):
+    program = f"{sys.executable} -c 'from hevopt.cli import main; main()'"
+    words = f"run A --cycle nedc --out {tmp_path}/steps.csv"
+    shell = ["bash", "-c", f"set -o pipefail; {program} {words} | true"]
+    done = subprocess.run(shell, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "steps.csv").exists()
+
+
+def test_names_that_are_no_utf8_work_or_are_one_message(hevopt, tmp_path):
+    drive, page = (tmp_path / os.fsdecode(name) for name in (b"c\xe9.csv", b"p\xe9.html"))
+    drive.write_text("time_s,speed_kmh\n0,0\n10,36\n20,36\n30,0\n")
+    saved = page.with_suffix(".json")
+    words = ("--cycle", drive, "--report", page, "--save", saved, "--out", page.with_suffix(".csv"))
+    done = hevopt("compare", "--architectures", "A", *words)
+    assert done.status == 0, done.err
+    assert hevopt("report", saved, "--out", page)[::2] == (0, "")
+    component = drive.with_suffix(".toml")
+    done = hevopt("compare", "--architectures", "C2", "--set", f'engine="{component}"')
+    assert done.status == 2 and done.err.count("hevopt: ") == 1
+
+
 def test_a_full_disk_is_one_message(tmp_path):
     def allow_no_bytes():
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))

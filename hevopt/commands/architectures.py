@@ -29,6 +29,7 @@ def new(
 ) -> None:
     """Write a commented architecture to edit, with the same results as the one it is like."""
     from hevopt.architecture_new import new_files
+    from hevopt.files import encodable
     from hevopt.writing import check_writable, write_whole
 
     files = new_files(name, like, out, listed(components) or ())
@@ -36,7 +37,7 @@ def new(
     for path, text in files.items():
         if path.parent.name == "components":
             path.parent.mkdir(exist_ok=True)
-        write_whole(path, text.encode())
+        write_whole(path, encodable(text).encode())
         write(f"written: {path}")
     write(f"next: edit, then  hevopt validate {shlex.quote(str(list(files)[-1]))}")
 

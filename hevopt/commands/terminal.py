@@ -1,11 +1,8 @@
 """What all commands share: printing, progress, checks of what a user names."""
 
-import os
 import sys
 from time import monotonic
 from typing import TYPE_CHECKING
-
-import typer
 
 from hevopt.errors import DataError
 
@@ -36,10 +33,6 @@ def write(text: str) -> None:
     try:
         print(text, flush=True)
     except OSError as error:
-        # What is left in the buffer would fail once more when Python ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if isinstance(error, BrokenPipeError):
-            raise typer.Exit from None  # the reader, such as `head`, has seen enough
         raise DataError(f"cannot write to standard output ({error.strerror})") from None
 
 

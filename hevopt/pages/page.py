@@ -16,6 +16,8 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from hevopt.files import encodable
+
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -27,7 +29,7 @@ def render(template: str, scripts: tuple[str, ...], data: bytes, **context: Any)
     library, digest = _plotly()
     code = "".join(_own(name) for name in ("page.js", *scripts))
     allowed = " ".join(f"'sha256-{d}'" for d in (digest, _digest(code)))
-    return _environment().get_template(template).render(
+    page = _environment().get_template(template).render(
         policy=f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'",
         style=Markup(_own("page.css")),
@@ -36,6 +38,7 @@ def render(template: str, scripts: tuple[str, ...], data: bytes, **context: Any)
         data=Markup(base64.b64encode(data).decode()),
         **context,
     )  # fmt: skip
+    return encodable(page)
 
 
 @cache
