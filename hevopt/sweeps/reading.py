@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from hevopt.errors import DataError
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.store import check_kind, told
 from hevopt.sweeps.stored import OUTCOMES, check_case, check_meta, check_pruned, loaded
+from hevopt.writing import temporary_folder
 
 _RECORDS = """
 SELECT plan.design, designs.parameters, plan.cycle, plan.strategy, plan.nox_weight,
@@ -123,17 +123,17 @@ def _connected(path: Path, stack: ExitStack) -> sqlite3.Connection:
     Beside a store SQLite wants files of its own, which the last to close it removes if it may write. Where there
     can be none, the store cannot change either; what was not yet merged into it is merged in a copy.
     """
-    log = path.with_name(path.name + "-wal")
+    log = Path(os.path.realpath(path) + "-wal")
     writable = os.access(path, os.W_OK) and os.access(path.absolute().parent, os.W_OK)
     try:
         return _opened(path, "mode=rw" if writable else "mode=ro", stack)
     except sqlite3.OperationalError:
         if log.exists() and log.stat().st_size:
-            folder = Path(stack.enter_context(TemporaryDirectory(prefix="hevopt-")))
-            for file in (path, log):
-                shutil.copy(file, folder / file.name)
+            folder = stack.enter_context(temporary_folder())
+            for file, name in ((path, "store"), (log, "store-wal")):
+                shutil.copy(file, folder / name)
             with told(path):
-                return _opened(folder / path.name, "mode=rw", stack)
+                return _opened(folder / "store", "mode=rw", stack)
     except sqlite3.Error:
         pass
     with told(path):
