@@ -87,6 +87,11 @@ def versions() -> dict[str, str]:
     return {"hevopt": __version__, "python": platform.python_version()} | names
 
 
+def code_digest() -> str:
+    """SHA-256 of everything but its inputs that can change a result: hevopt's code, Python, the libraries."""
+    return digest({"code": physics_digest(), "versions": versions()})
+
+
 def files_digests(
     cars: Iterable[Architecture], cycles: Iterable[Cycle], others: Iterable[Path] = ()
 ) -> Mapping[str, str]:

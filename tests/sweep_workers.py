@@ -32,17 +32,15 @@ def row_of(key):
 
 
 def work(job, guard):
-    outcomes = []
     for case in job.cases:
         try:
             with guard():
                 extra = act(job.changes.get("does", {}).get(case.key))
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
-            outcomes.append(Outcome(case.key, "failed", None, text, 0.001))
+            yield Outcome(case.key, "failed", None, text, 0.001)
         else:
-            outcomes.append(Outcome(case.key, "ok", row_of(case.key) | extra, None, 0.001))
-    return outcomes
+            yield Outcome(case.key, "ok", row_of(case.key) | extra, None, 0.001)
 
 
 def slow(job, guard):
@@ -110,7 +108,7 @@ def raises(job, guard):
 
 
 def forgets(job, guard):
-    return work(job, guard)[1:]
+    return list(work(job, guard))[1:]
 
 
 def act(what):
@@ -130,6 +128,9 @@ def act(what):
             while len(os.listdir(folder)) < count and time.monotonic() < deadline:
                 time.sleep(0.02)
             return act("pids")
+        case ["note", file]:
+            with open(file, "a") as f:
+                f.write("ran\n")
         case "rest":
             time.sleep(1.0)
         case "threads":

@@ -31,8 +31,7 @@ from hevopt.pages.sweep_drawing import (
 )
 from hevopt.pages.sweep_effects import Effect, effect, is_log, is_numeric
 from hevopt.pages.sweep_verdict import Group, groups_of, shown_value, verdict
-from hevopt.provenance import versions
-from hevopt.sweeps.child import code_digest
+from hevopt.provenance import code_digest, versions
 from hevopt.sweeps.jobs import NOX_WEIGHT
 from hevopt.sweeps.reading import Record
 from hevopt.sweeps.reasons import first_line

@@ -1,16 +1,15 @@
 """The process that solves: alone with a job, so that whatever the job does, only this process is lost.
 
 It speaks with the worker that started it over one pipe: `Terms` come in and READY goes out, then jobs come in and
-(CASE, place) goes out before each case, (DONE, outcomes) after the last.
+(CASE, key) goes out before each case, (OUTCOME, outcome) as it is there, (DONE, None) after the last.
 """
 
 import ctypes
 import json
 import os
-import resource
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -20,10 +19,13 @@ from time import perf_counter
 from typing import Any
 
 from hevopt.errors import SolverError
+from hevopt.provenance import code_digest
 from hevopt.sweeps.jobs import Job, Outcome
 
-READY, REFUSED, DIFFERS, CASE, DONE = "ready", "refused", "differs", "case", "done"
-Work = Callable[..., list[Outcome]]
+READY, REFUSED, CASE, OUTCOME, DONE = "ready", "refused", "case", "outcome", "done"
+# For whatever ends a sweep before its end.
+KEPT = "all results so far are stored: the same command goes on from there"
+Work = Callable[..., Iterable[Outcome]]
 # The kernel's prctl(2): a signal for this process when the one that started it ends.
 _PR_SET_PDEATHSIG = 1
 # A worker that has gone leaves nothing behind for longer than this.
@@ -34,8 +36,8 @@ _IDLE_S = 60.0
 class Terms:
     """What a job is run with: by which function, within which limits, by which code.
 
-    work: "module:name" of a function from job and guard to outcomes, the guard being entered around every case; a
-    name, so that a worker need not load what only its process uses
+    work: "module:name" of a function from job and guard to outcomes, as they are there, the guard being entered
+    around every case; a name, so that a worker need not load what only its process uses
     timeout_s: of a case; memory_mb: address space of the process that solves, itself included
     loading_s: granted on top of timeout_s to the first case of a process, which loads and compiles
     code: digest that the code beside the worker must have, or None for any
@@ -48,17 +50,14 @@ class Terms:
     code: str | None = None
 
 
-def code_digest() -> str:
-    """SHA-256 of everything but its inputs that can change a result: hevopt's code, Python, the libraries."""
-    from hevopt.provenance import digest, physics_digest, versions
-
-    return digest({"code": physics_digest(), "versions": versions()})
-
-
-class CodeDiffers(SolverError):
-    """A worker's code is not what the sweep began with; what was solved before is stored."""
+class CannotStart(SolverError):
+    """No worker can start, be it for its terms or its code; what was solved before is stored."""
 
     exit_status = 4
+
+    def __str__(self) -> str:
+        # Made here: an error that travels from a worker is made anew from what it was made of.
+        return f"a worker cannot start: {super().__str__()}; {KEPT}"
 
 
 def main() -> None:
@@ -71,13 +70,13 @@ def main() -> None:
             work = resolve_name(terms.work)
             _accept(terms)
         except Exception as error:
-            kind = DIFFERS if isinstance(error, CodeDiffers) else REFUSED
-            pipe.send((kind, str(error) or type(error).__name__))
+            pipe.send((REFUSED, str(error) or type(error).__name__))
             return
         pipe.send((READY, None))
         bench = _Bench(pipe, terms, work)
         while pipe.poll(_IDLE_S):
-            pipe.send((DONE, bench.outcomes(pipe.recv())))
+            bench.solve(pipe.recv())
+            pipe.send((DONE, None))
 
 
 def _end_with(parent: int) -> None:
@@ -92,12 +91,13 @@ def _end_with(parent: int) -> None:
 
 def _accept(terms: Terms) -> None:
     if terms.code is not None and terms.code != code_digest():
-        raise CodeDiffers(
+        raise SolverError(
             "its hevopt, Python or libraries are not those that this process started with; install the same "
-            "everywhere, change nothing while a sweep runs, and run the same command again: all results so far are "
-            "stored"
+            "everywhere, change nothing while a sweep runs, and run the same command again"
         )
     if terms.memory_mb is not None:
+        import resource
+
         limit, hard = int(terms.memory_mb * 2**20), resource.getrlimit(resource.RLIMIT_AS)[1]
         limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
@@ -112,7 +112,7 @@ def _accept(terms: Terms) -> None:
 def _address_space() -> int:
     with suppress(OSError):
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        return pages * resource.getpagesize()
+        return pages * os.sysconf("SC_PAGE_SIZE")
     return 0
 
 
@@ -122,37 +122,41 @@ class _Bench:
     def __init__(self, pipe: Connection, terms: Terms, work: Work) -> None:
         self._pipe, self._terms, self._work = pipe, terms, work
         self._loading_s = terms.loading_s
-        # The case under a time limit, the next one, and those that were late.
-        self._timed: int | None = None
-        self._next, self._late = 0, set[int]()
+        # The case under a time limit, the cases to come, and those that were late.
+        self._timed: str | None = None
+        self._next: Iterator[str] = iter(())
+        self._late = set[str]()
         signal.signal(signal.SIGALRM, self._stop)
 
-    def outcomes(self, job: Job) -> list[Outcome]:
-        """Exactly one outcome for every case, each fit to be stored."""
-        self._next, began = 0, perf_counter()
+    def solve(self, job: Job) -> None:
+        """Send exactly one outcome for every case, each fit to be stored, as soon as it is there."""
+        left, began = {case.key: case for case in job.cases}, perf_counter()
+        self._next = iter(tuple(left))
         self._late.clear()
+        fault = "the worker gave no outcome for this case"
         try:
-            found = {outcome.key: outcome for outcome in self._work(job, self._guard)}
-            fault = "the worker gave no outcome for this case"
+            for outcome in self._work(job, self._guard):
+                if left.pop(outcome.key, None) is not None:
+                    self._send(outcome)
         except BaseException as error:
-            found, fault = {}, f"{type(error).__name__}: {error}"
-        missing = Outcome("", "failed", None, fault, perf_counter() - began)
-        outcomes = [_storable(case.key, found.get(case.key, missing)) for case in job.cases]
+            fault = f"{type(error).__name__}: {error}"
+        for key in left:
+            self._send(Outcome(key, "failed", None, fault, perf_counter() - began))
+
+    def _send(self, outcome: Outcome) -> None:
         # Whatever the case made of the exception that was to stop it.
-        for place in self._late:
-            outcomes[place] = replace(
-                outcomes[place], status="failed", row=None, error=late(self._terms.timeout_s)
-            )
-        return outcomes
+        if outcome.key in self._late:
+            outcome = replace(outcome, status="failed", row=None, error=late(self._terms.timeout_s))
+        self._pipe.send((OUTCOME, _storable(outcome)))
 
     @contextmanager
     def _guard(self) -> Iterator[None]:
-        place, self._next = self._next, self._next + 1
+        key = next(self._next)
         limit_s, self._loading_s = self._loading_s, 0.0
-        self._pipe.send((CASE, place))
+        self._pipe.send((CASE, key))
         try:
             if self._terms.timeout_s is not None:
-                self._timed = place
+                self._timed = key
                 signal.setitimer(signal.ITIMER_REAL, self._terms.timeout_s + limit_s)
             yield
         finally:
@@ -160,10 +164,10 @@ class _Bench:
             signal.setitimer(signal.ITIMER_REAL, 0)
 
     def _stop(self, *_: Any) -> None:
-        place, self._timed = self._timed, None
+        key, self._timed = self._timed, None
         # An alarm that is heard only after its case stops nothing.
-        if place is not None:
-            self._late.add(place)
+        if key is not None:
+            self._late.add(key)
             raise SolverError(late(self._terms.timeout_s))
 
 
@@ -172,8 +176,8 @@ def late(timeout_s: float | None) -> str:
     return f"timeout: took more than {timeout_s:g} s"
 
 
-def _storable(key: str, outcome: Outcome) -> Outcome:
-    fault = outcome.error
+def _storable(outcome: Outcome) -> Outcome:
+    key, fault = outcome.key, outcome.error
     if outcome.status in ("ok", "infeasible", "failed"):
         try:
             json.dumps(outcome.row, allow_nan=False)

@@ -5,6 +5,8 @@ A pool takes a function of no arguments and gives a future. Dask and Ray are imp
 
 import logging
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
@@ -14,9 +16,11 @@ from typing import Any
 
 from hevopt.errors import DataError
 from hevopt.files import shown
-from hevopt.sweeps.supervisor import ONE_THREAD, end_with
+from hevopt.sweeps.reasons import first_line
+from hevopt.sweeps.supervisor import ONE_THREAD, end_with, python_path
 
 BACKENDS = ("loky", "dask", "ray")
+MODULES = {"dask": "distributed", "ray": "ray"}
 _CONNECT_S = 20.0
 
 
@@ -33,10 +37,11 @@ class Pool:
 def open_pool(backend: str, workers: int | None, scheduler: str | None) -> Pool:
     """A pool of some workers: by default as many as this process may use cores, or all of the scheduler's.
 
-    Raises DataError where the backend is not installed, or nothing answers at the scheduler's address.
+    Raises DataError where the backend is not installed, or nothing answers at the scheduler's address in time.
     """
-    opened = {"loky": _loky, "dask": _dask, "ray": _ray}[backend]
-    return opened(workers, scheduler)
+    if scheduler is not None:
+        _check_answer(backend, scheduler)
+    return OPENED[backend](workers, scheduler)
 
 
 def check_backend(backend: str, scheduler: str | None) -> None:
@@ -70,15 +75,29 @@ def _show_token() -> None:
         os.environ.setdefault("RAY_AUTH_MODE", "token")
 
 
+def _check_answer(backend: str, scheduler: str) -> None:
+    """DataError where a scheduler does not answer: asked by a process that is ended, since to a silent one, or a
+    wrong address, Dask and Ray hold on for minutes or for ever, and tell stderr of it."""
+    command = [sys.executable, "-P", "-m", "hevopt.sweeps.probe"]
+    asked = subprocess.run(
+        [*command, backend, scheduler, str(_CONNECT_S), str(os.getpid())], stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace",
+        env=os.environ | {"PYTHONPATH": python_path()},
+    )  # fmt: skip
+    if asked.returncode:
+        silent = no_answer(backend, scheduler, "its client ended without one")
+        raise DataError((asked.stdout.splitlines() or [silent])[-1])
+
+
 def cores() -> int:
     """How many cores this process may use."""
-    from joblib import cpu_count
+    from loky import cpu_count
 
     return cpu_count()
 
 
 def _loky(workers: int | None, _: str | None) -> Pool:
-    from joblib.externals.loky import ProcessPoolExecutor
+    from loky import ProcessPoolExecutor
 
     count = workers or cores()
     executor = ProcessPoolExecutor(
@@ -103,7 +122,7 @@ def _dask(workers: int | None, scheduler: str | None) -> Pool:
     except Exception as error:
         for opened in filter(None, (client, cluster)):
             opened.close()
-        raise _no_answer("Dask", scheduler, error) from None
+        raise DataError(no_answer("dask", scheduler, _said(error))) from None
 
     count = sum(client.nthreads().values())
     limited = min(workers or count, count)
@@ -150,10 +169,10 @@ def _ray(workers: int | None, scheduler: str | None) -> Pool:
         )  # fmt: skip
         count = int(ray.cluster_resources().get("CPU", 0))
     except Exception as error:
-        raise _no_answer("Ray", scheduler, error) from None
+        raise DataError(no_answer("ray", scheduler, _said(error))) from None
     if not count:
         ray.shutdown()
-        raise _no_answer("Ray", scheduler, RuntimeError("the cluster has no CPU"))
+        raise DataError(no_answer("ray", scheduler, "the cluster has no CPU"))
     run = ray.remote(num_cpus=1, max_retries=3)(_called)
     limited = min(workers or count, count)
 
@@ -167,10 +186,17 @@ def _called(call: Callable[[], Any]) -> Any:
     return call()
 
 
-def _no_answer(kind: str, scheduler: str | None, error: Exception) -> DataError:
-    first = (str(error).splitlines() or [""])[0] or type(error).__name__
+OPENED = {"loky": _loky, "dask": _dask, "ray": _ray}
+
+
+def _said(error: Exception) -> str:
+    return first_line(str(error) or type(error).__name__)
+
+
+def no_answer(backend: str, scheduler: str | None, why: str) -> str:
+    """The message where a cluster cannot be had."""
     where = f"at {shown(scheduler)}" if scheduler else "on this machine"
-    return DataError(
-        f"no {kind} cluster {where} ({first}); check that it runs and has workers, and that its version "
+    return (
+        f"no {backend.title()} cluster {where} ({why}); check that it runs and has workers, and that its version "
         "is that of this environment"
     )

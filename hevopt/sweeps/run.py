@@ -9,9 +9,9 @@ from time import monotonic
 
 from hevopt.cycle import load_cycle
 from hevopt.errors import DataError
-from hevopt.provenance import digest, files_digests, versions
+from hevopt.provenance import code_digest, digest, files_digests, versions
 from hevopt.sweeps.backends import Run, workers
-from hevopt.sweeps.child import Terms, code_digest
+from hevopt.sweeps.child import Terms
 from hevopt.sweeps.designs import Designs, cars_of, designs_of, groups_of
 from hevopt.sweeps.jobs import BOUND, Job, Planned, jobs_of
 from hevopt.sweeps.prune import Bounded, follows, mean_bound, mean_objective, search
@@ -153,7 +153,7 @@ def run_sweep(
 ) -> Progress:
     """Run what the store lacks of a plan that it has begun, and store it as it comes.
 
-    What is stored does not depend on backend and workers, except for the seconds. Raises Stopped.
+    What is stored does not depend on backend and workers, except for the seconds. Raises Stopped, or StoreGone.
     """
     done = settled(store.statuses(), retry_failed=retry_failed)
     missing = {case.key for case in plan.planned} - done
@@ -170,6 +170,7 @@ def run_sweep(
             _pruned(course)
         else:
             course.run(missing)
+        store.check_place()
     return progress
 
 
@@ -192,6 +193,7 @@ class _Course:
         arrivals = self.workers()(jobs)
         try:
             for outcomes in arrivals:
+                self.store.check_place()
                 self.store.add(outcomes)
                 self.progress.done += len(outcomes)
                 self.progress.failed += sum(o.status == "failed" for o in outcomes)

@@ -18,8 +18,7 @@ from time import monotonic, sleep
 from typing import IO, NamedTuple
 from weakref import finalize
 
-from hevopt.errors import SolverError
-from hevopt.sweeps.child import DIFFERS, DONE, READY, REFUSED, CodeDiffers, Terms, late
+from hevopt.sweeps.child import CASE, OUTCOME, READY, REFUSED, CannotStart, Terms, late
 from hevopt.sweeps.jobs import Job, Outcome
 
 ONE_THREAD = dict.fromkeys(
@@ -33,9 +32,9 @@ _ERROR_BYTES = 400
 
 
 class Ended(NamedTuple):
-    """A process that did not answer: at which case, why, and whether that was for taking too long."""
+    """A process that did not answer: at which case, if at one, why, and whether that was for taking too long."""
 
-    place: int
+    key: str | None
     fault: str
     late: bool
 
@@ -47,21 +46,21 @@ def run_task(jobs: Sequence[Job], terms: Terms) -> list[Outcome]:
 
 def _outcomes(job: Job, terms: Terms) -> list[Outcome]:
     """Outcomes of a job. A case during which the process ends is tried once more: it may not have been at fault."""
-    failed: list[Outcome] = []
+    found: dict[str, Outcome] = {}
     suspects: set[str] = set()
-    left = list(job.cases)
-    while left:
+    while left := tuple(case for case in job.cases if case.key not in found):
         began = monotonic()
-        answer = _process(terms).run(replace(job, cases=tuple(left)))
-        if not isinstance(answer, Ended):
-            return failed + answer
-        case = left[answer.place]
-        if answer.late or case.key in suspects:
-            fault = answer.fault if answer.late else f"{answer.fault}, twice"
-            failed.append(Outcome(case.key, "failed", None, fault, monotonic() - began))
-            left.remove(case)
-        suspects.add(case.key)
-    return failed
+        ended = _process(terms).run(replace(job, cases=left), found)
+        if ended is None:
+            continue
+        key = ended.key or next((case.key for case in left if case.key not in found), None)
+        if key is None:
+            break
+        if ended.late or key in suspects:
+            fault = ended.fault if ended.late else f"{ended.fault}, twice"
+            found[key] = Outcome(key, "failed", None, fault, monotonic() - began)
+        suspects.add(key)
+    return list(found.values())
 
 
 _kept = threading.local()
@@ -78,8 +77,8 @@ def _process(terms: Terms) -> "_Process":
             _kept.process = _Process(terms)
             return _kept.process
         except _NotStarted as error:
-            fault = f"a worker cannot start: {error}, {attempt + 1} times"
-    raise SolverError(fault)
+            fault = f"{error}, {attempt + 1} times"
+    raise CannotStart(fault)
 
 
 def drop_process() -> None:
@@ -105,7 +104,7 @@ class _Process:
         environment = os.environ | ONE_THREAD
         # Dask has its workers give memory back at once, which costs a process that solves a third of its speed.
         environment.pop("MALLOC_TRIM_THRESHOLD_", None)
-        environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+        environment["PYTHONPATH"] = python_path()
         with theirs:
             self._running = subprocess.Popen(
                 [sys.executable, "-P", "-m", "hevopt.sweeps.child", str(theirs.fileno()), str(os.getpid())],
@@ -126,27 +125,29 @@ class _Process:
             return
         said = self._said()
         self.end()
-        if kind in (REFUSED, DIFFERS):
-            refusal = CodeDiffers if kind == DIFFERS else SolverError
-            raise refusal(f"a worker cannot start: {text}")
+        if kind == REFUSED:
+            raise CannotStart(text)
         raise _NotStarted(f"its process ended before it was ready{said}")
 
     def alive(self) -> bool:
         return self._running.poll() is None
 
-    def run(self, job: Job) -> list[Outcome] | Ended:
-        """Outcomes of a job, or at which case the process ended or was ended."""
+    def run(self, job: Job, found: dict[str, Outcome]) -> Ended | None:
+        """Put the outcomes of a job among those found, as they come; how the process ended where it did."""
         self._errors.seek(0)
         self._errors.truncate()
-        place, deadline = 0, self._deadline()
+        key, deadline = None, self._deadline()
         try:
             self._pipe.send(job)
             while self._pipe.poll(None if deadline is None else max(0.0, deadline - monotonic())):
                 kind, value = self._pipe.recv()
-                self._warm = self._warm or kind == DONE or value > 0
-                if kind == DONE:
-                    return value
-                place, deadline = value, self._deadline()
+                if kind == CASE:
+                    self._warm = self._warm or key is not None
+                    key, deadline = value, self._deadline()
+                elif kind == OUTCOME:
+                    found[value.key], key, self._warm = value, None, True
+                else:
+                    return None
         except (EOFError, OSError):
             code = self._running.wait()
             how = f"signal {-code}" if code < 0 else f"exit status {code}"
@@ -154,9 +155,9 @@ class _Process:
                 f"the process of the case ended ({how}; out of memory, or a crash){self._said()}"
             )
             self.end()
-            return Ended(place, fault, late=False)
+            return Ended(key, fault, late=False)
         self.end()
-        return Ended(place, late(self.terms.timeout_s), late=True)
+        return Ended(key, late(self.terms.timeout_s), late=True)
 
     def _deadline(self) -> float | None:
         if self.terms.timeout_s is None:
@@ -169,6 +170,11 @@ class _Process:
         lines = self._errors.read()[-_ERROR_BYTES:].decode(errors="replace").split("\n")
         text = " ".join(line.strip() for line in lines if line.strip())
         return f": {text}" if text else ""
+
+
+def python_path() -> str:
+    """Where a process started from this one finds the same modules."""
+    return os.pathsep.join(path for path in sys.path if path)
 
 
 def _end(running: subprocess.Popen, pipe: Connection, errors: IO[bytes]) -> None:

@@ -1,6 +1,6 @@
 """What a worker does with a job: build the control table once, solve every case on it, never raise."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
 from math import isfinite
@@ -30,13 +30,12 @@ _TARGET_GAP = 2e-3
 
 def run_job(
     job: Job, guard: Callable[[], AbstractContextManager[Any]] = nullcontext
-) -> list[Outcome]:
-    """An outcome for every case of a job; any exception of a case is its outcome.
+) -> Iterator[Outcome]:
+    """An outcome for every case of a job, as it is there; any exception of a case is its outcome.
 
     guard: entered around every case, such as a time limit that raises
     """
     bench = _Bench(job)
-    outcomes = []
     for case in job.cases:
         began = perf_counter()
         status, row, error = "ok", None, None
@@ -49,8 +48,7 @@ def run_job(
             status, error = "failed", str(found)
         except Exception as found:
             status, error = "failed", f"{type(found).__name__}: {found}"
-        outcomes.append(Outcome(case.key, status, row, error, perf_counter() - began))
-    return outcomes
+        yield Outcome(case.key, status, row, error, perf_counter() - began)
 
 
 class _Bench:

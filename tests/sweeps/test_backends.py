@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -15,7 +16,8 @@ import sweep_workers
 from sweep_runs import alive, table, write_study
 from sweep_runs import run as swept
 
-from hevopt.errors import DataError, SolverError
+from hevopt.errors import DataError, HevoptError
+from hevopt.sweeps import pools, supervisor
 from hevopt.sweeps.backends import workers
 from hevopt.sweeps.child import Terms
 from hevopt.sweeps.pools import check_backend
@@ -85,14 +87,23 @@ def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_pat
     found = by_key(outcomes_of(sweep_workers.jobs(20, 2, does), terms, count=2))
     assert set(found) == {f"k{n}" for n in range(40)}
     errors = {int(key[1:]): o.error for key, o in found.items() if o.status == "failed"}
-    # An exit is the end of a job's process: the other case of the job is not to blame, but has no outcome either.
-    assert set(errors) == set(does) - {30} | {24}
+    assert set(errors) == set(does) - {30}
     expected = {
         1: "not today", 13: "signal 9.*twice", 17: "cannot be stored", 20: "cannot be stored", 25: "SystemExit",
     } | dict.fromkeys((4, 8, 10, 35), "^timeout: took more than 1 s$")  # fmt: skip
     for number, words in expected.items():
         assert re.search(words, errors[number]), errors[number]
     assert os.path.exists(marker)
+
+
+def test_what_a_job_has_finished_is_not_run_again_when_its_process_ends(tmp_path):
+    ran = tmp_path / "ran"
+    does = {n: ["note", str(ran)] for n in range(12)} | {3: "die", 4: "hang in C", 9: "die"}
+    terms = Terms("sweep_workers:work", timeout_s=1.0, loading_s=0.0)
+    found = by_key(outcomes_of(sweep_workers.jobs(1, 12, does), terms, count=1))
+    failed = {int(key[1:]) for key, o in found.items() if o.status == "failed"}
+    assert len(found) == 12 and failed == {3, 4, 9}
+    assert ran.read_text() == "ran\n" * 9
 
 
 def test_a_case_that_eats_memory_is_its_own_failure():
@@ -156,14 +167,60 @@ def test_work_that_breaks_its_promise_gives_failures(work, words):
     ],
 )
 def test_workers_that_cannot_start_are_an_error_and_not_failed_cases(terms, words):
-    with pytest.raises(SolverError, match=words):
+    with pytest.raises(
+        HevoptError, match=f"a worker cannot start: .*{words}.*so far are stored"
+    ) as found:
         outcomes_of(sweep_workers.jobs(4), terms, count=1)
+    assert found.value.exit_status == 4 and str(found.value).count("a worker cannot start") == 1
 
 
-def test_other_code_than_the_sweep_began_with_is_an_interruption():
-    with pytest.raises(SolverError, match="results so far are stored") as found:
-        outcomes_of(sweep_workers.jobs(2), Terms("sweep_workers:work", code="other"), count=1)
+def test_a_worker_whose_process_ends_before_it_is_ready_says_why_and_that_results_are_kept(
+    monkeypatch,
+):
+    monkeypatch.setattr(supervisor.sys, "executable", "/bin/false")
+    with pytest.raises(HevoptError, match=r"cannot start.* 3 times.*so far are stored") as found:
+        supervisor.run_task(sweep_workers.jobs(1), WORK)
     assert found.value.exit_status == 4
+
+
+def test_where_no_pool_can_be_opened_results_are_kept_too(monkeypatch):
+    def fails(*_):
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setitem(pools.OPENED, "loky", fails)
+    with pytest.raises(
+        HevoptError, match=r"no worker can be started: .*unavailable; all res"
+    ) as found:
+        outcomes_of(sweep_workers.jobs(1))
+    assert found.value.exit_status == 4
+
+
+@pytest.fixture
+def silent_port():
+    """An address that takes connections and never answers."""
+    with socket.create_server(("127.0.0.1", 0), backlog=50) as server:
+        yield server.getsockname()[1]
+
+
+@pytest.mark.parametrize(
+    ("backend", "address"), [("dask", "tcp://127.0.0.1:{}"), ("ray", "127.0.0.1:{}")]
+)
+def test_a_scheduler_that_says_nothing_is_told_after_the_time_limit(
+    silent_port, monkeypatch, backend, address
+):
+    monkeypatch.setattr(pools, "_CONNECT_S", 0.5)
+    where = address.format(silent_port)
+    with pytest.raises(
+        DataError, match=rf"no {backend.title()} cluster at '{where}' .none within 0.5 s"
+    ):
+        outcomes_of(sweep_workers.jobs(1), backend=backend, scheduler=where)
+
+
+def test_the_caller_is_heard_and_goes_while_a_scheduler_says_nothing(silent_port):
+    began = time.monotonic()
+    with workers(WORK, backend="dask", scheduler=f"tcp://127.0.0.1:{silent_port}") as run:
+        assert next(run(sweep_workers.jobs(1))) == []
+    assert time.monotonic() - began < pools._CONNECT_S
 
 
 @pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=pytest.mark.long)])

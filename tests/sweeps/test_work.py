@@ -21,7 +21,7 @@ def one_job(strategies=("ecms", "dp", "bound"), weights=(0.0, 10.0), **settings)
 
 
 def test_a_job_gives_the_rows_that_a_comparison_would():
-    outcomes = run_job(one_job()[0])
+    outcomes = list(run_job(one_job()[0]))
     assert [o.status for o in outcomes] == ["ok"] * 6
     case = prepare(load_architecture("C2", CHANGES), load_cycle("nedc"), nox_weight=10.0)
     row, _, trajectory = run_case(case, "ecms")
@@ -44,7 +44,7 @@ def test_a_job_gives_the_rows_that_a_comparison_would():
 
 
 def test_no_objective_lies_below_the_bound_that_pruning_uses():
-    outcomes = run_job(one_job(("bound", "ecms", "dp", "conventional"))[0])
+    outcomes = list(run_job(one_job(("bound", "ecms", "dp", "conventional"))[0]))
     for rows in (outcomes[:4], outcomes[4:]):
         bound = rows[0].row["bound_l_per_100km"]
         objectives = [o.row["objective_l_per_100km"] for o in rows[1:]]
@@ -81,7 +81,7 @@ def test_a_copy_of_a_shipped_cycle_teaches_no_more_than_the_cycle_itself(tmp_pat
     rows = []
     for cycle in ("hwfet", str(tmp_path / "mine.csv")):
         ((job, planned),) = jobs_of("C2", [cycle], ["sdp"], [({}, [(0, 0.0)])])
-        rows.append((planned[0].key, run_job(job)[0].row))
+        rows.append((planned[0].key, next(run_job(job)).row))
     # One drive under two names: one key, and so it must be one result.
     assert rows[0] == rows[1]
 
@@ -122,7 +122,7 @@ def test_a_file_that_changes_while_a_sweep_runs_fails_its_cases(tmp_path):
     cycle = tmp_path / "drive.csv"
     cycle.write_text("time_s,speed_kmh\n0,0\n10,36\n20,36\n30,0\n")
     ((job, _),) = jobs_of("C2", [str(cycle)], ["dp"], [({}, [(0, 0.0)])])
-    assert run_job(job)[0].status == "ok"
+    assert next(run_job(job)).status == "ok"
     cycle.write_text("time_s,speed_kmh\n0,0\n10,40\n20,36\n30,0\n")
     (outcome,) = run_job(job)
     assert outcome.status == "failed" and "changed after the sweep began" in outcome.error
@@ -130,4 +130,4 @@ def test_a_file_that_changes_while_a_sweep_runs_fails_its_cases(tmp_path):
 
 def test_a_bound_says_where_the_cycle_is_not_followed():
     ((job, _),) = jobs_of("A", ["us06"], ["bound"], [({}, [(0, 0.0)])], allow_shortfall=True)
-    assert "shortfall at" in run_job(job)[0].row["status"]
+    assert "shortfall at" in next(run_job(job)).row["status"]
