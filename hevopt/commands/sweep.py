@@ -93,6 +93,7 @@ def sweep(
             )
         export_store(store, export)
         return
+    _check_system()
     from hevopt.sweeps.run import Execution, Stopped
     from hevopt.sweeps.signals import wish_to_end
 
@@ -128,6 +129,18 @@ def _check_given(context: typer.Context) -> None:
     }
     if extra := [option for name, option in options.items() if name in given - beside]:
         raise DataError(f"{alone}; leave out {', '.join(extra)}")
+
+
+def _check_system() -> None:
+    """DataError where the system lacks what keeps stores and workers safe."""
+    try:
+        import fcntl  # noqa: F401
+        import resource  # noqa: F401
+    except ImportError:
+        raise DataError(
+            "sweeps run on Linux, not on this system; stores from there can be looked at, exported and reported "
+            "here"
+        ) from None
 
 
 def _check(

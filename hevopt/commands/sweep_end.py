@@ -42,6 +42,9 @@ def end(store: Path, done: "Progress | None", export: Path | None) -> None:
     )
     if counts["failed"]:
         write("--retry-failed runs failed cases once more")
+    if counts["missing"]:
+        write(f"{counts['missing']} cases have no result; the same command runs them")
+        raise typer.Exit(PARTLY)
     if not counts["ok"]:
         raise typer.Exit(InfeasibleError.exit_status)
     if counts["failed"]:

@@ -15,8 +15,15 @@ _OWNER_BYTES = 200
 
 @contextmanager
 def locked(store: Path) -> Iterator[None]:
-    """Hold a store for this process; DataError, naming the holder, where another one does."""
-    path = store.with_name(store.name + ".lock")
+    """Hold a store for this process, by whatever link; DataError, naming the holder, where another one does."""
+    target = Path(os.path.realpath(store))
+    # SQLite keeps what is not yet in the file beside one of its names: who comes by the other spoils it.
+    if target.exists() and target.stat().st_nlink > 1:
+        raise DataError(
+            f"{store}: has other names (hard links), by which a second sweep could spoil it; name a copy, with "
+            "--store"
+        )
+    path = target.with_name(target.name + ".lock")
     descriptor = _acquired(path, store)
     try:
         os.ftruncate(descriptor, 0)

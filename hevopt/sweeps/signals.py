@@ -44,12 +44,16 @@ class Wish:
 
 @contextmanager
 def wish_to_end() -> Iterator[Wish]:
-    """Where signals say that the run is to end; outside the main thread, which gets them, they are left alone."""
+    """Where signals say that the run is to end, but for those that it was started to ignore, as by `nohup`.
+
+    Outside the main thread, which gets them, they are left alone.
+    """
     wish = Wish()
     if threading.current_thread() is not threading.main_thread():
         yield wish
         return
-    before = {number: signal.signal(number, wish.receive) for number in _ASKED}
+    heard = [number for number in _ASKED if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, wish.receive) for number in heard}
     try:
         yield wish
     finally:

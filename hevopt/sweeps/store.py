@@ -13,6 +13,7 @@ half a row. A result is never deleted, and never replaced unless it was a failur
 """
 
 import json
+import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -22,8 +23,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from hevopt.errors import DataError
-from hevopt.files import printable
+from hevopt.errors import DataError, HevoptError
+from hevopt.files import encodable, printable
 from hevopt.sweeps.jobs import Outcome, Planned
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.stored import loaded
@@ -50,11 +51,24 @@ WHERE cases.status = 'failed'
 """
 
 
+class StoreGone(HevoptError):
+    """A store no longer lies at its path: what would be added to it nobody would find."""
+
+    exit_status = 4
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            f"{path}: the store was deleted, moved or replaced while the sweep ran, which has stopped; a moved one "
+            "has all results up to then: put it back, and run the same command again"
+        )
+
+
 class Store:
     """An open store; `open_store` makes one."""
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path, self._connection = path, connection
+        self._target, self._file, self._gone = path.resolve(), path.stat(), False
         self._waiting: list[tuple[Any, ...]] = []
         self._since_s = 0.0
 
@@ -71,11 +85,29 @@ class Store:
                 run.execute(f"DELETE FROM {table}")
             run.execute("INSERT OR IGNORE INTO meta VALUES ('created', ?)", (now,))
             run.executemany(
-                "INSERT OR REPLACE INTO meta VALUES (?, ?)", [*meta.items(), ("begun", now)]
+                "INSERT OR REPLACE INTO meta VALUES (?, ?)",
+                [*((name, encodable(value)) for name, value in meta.items()), ("begun", now)],
             )
             values = ((number, json.dumps(parameters)) for number, parameters in designs)
             run.executemany("INSERT INTO designs VALUES (?, ?)", values)
-            run.executemany("INSERT INTO plan VALUES (?, ?, ?, ?, ?)", plan)
+            run.executemany(
+                "INSERT INTO plan VALUES (?, ?, ?, ?, ?)",
+                (case._replace(cycle=encodable(case.cycle)) for case in plan),
+            )
+
+    def check_place(self) -> None:
+        """StoreGone where the file at the store's path is no longer the one that was opened."""
+        try:
+            there = os.path.samestat(self._file, self.path.stat())
+        except OSError:
+            there = False
+        if not there:
+            self._gone = True
+            # SQLite would leave what is not yet in the file beside its old name, where nobody looks for it.
+            with suppress(HevoptError), told(self.path):
+                self.commit()
+                self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            raise StoreGone(self.path)
 
     def add(self, outcomes: Iterable[Outcome]) -> None:
         """Take outcomes, and commit them and earlier ones when it is time; called with none, only that."""
@@ -83,7 +115,8 @@ class Store:
             if not self._waiting:
                 self._since_s = monotonic()
             row = None if o.row is None else json.dumps(o.row, allow_nan=False)
-            self._waiting.append((o.key, o.status, row, o.error, o.seconds))
+            error = None if o.error is None else encodable(o.error)
+            self._waiting.append((o.key, o.status, row, error, o.seconds))
         due = len(self._waiting) >= _COMMIT_ROWS or monotonic() - self._since_s >= _COMMIT_S
         if self._waiting and due:
             self.commit()
@@ -130,6 +163,9 @@ class Store:
         finally:
             with suppress(sqlite3.Error):
                 self._connection.close()
+            if self._gone and not self._target.exists():
+                for ending in ("-wal", "-shm"):
+                    self._target.with_name(self._target.name + ending).unlink(missing_ok=True)
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sweep_runs import check_sound
 
-from hevopt.errors import DataError
+from hevopt.errors import DataError, HevoptError
 from hevopt.sweeps import store as store_module
 from hevopt.sweeps.jobs import Outcome, Planned
 from hevopt.sweeps.lock import locked
@@ -225,6 +225,57 @@ def test_a_second_sweep_is_refused_by_name_and_a_killed_one_leaves_no_lock(tmp_p
     with locked(path), pytest.raises(DataError, match=str(os.getpid())), locked(path):
         pass
     assert not list(tmp_path.iterdir())
+
+
+def test_a_store_is_locked_by_whatever_link_it_is_named(tmp_path):
+    path, link = filled(tmp_path / "s.sqlite", []), tmp_path / "deep" / "link.sqlite"
+    link.parent.mkdir()
+    link.symlink_to(path)
+    for first, second in ((path, link), (link, path)):
+        with (
+            locked(first),
+            pytest.raises(DataError, match=f"another sweep.*process {os.getpid()} on "),
+            locked(second),
+        ):
+            pass
+    assert sorted(p.name for p in tmp_path.rglob("*.lock")) == []
+    (tmp_path / "hard.sqlite").hardlink_to(path)
+    with pytest.raises(DataError, match="hard links"), locked(path):
+        pass
+
+
+def move(path):
+    path.rename(path.with_name("moved.sqlite"))
+
+
+def move_the_folder(path):
+    path.parent.rename(path.parent.with_name("moved"))
+
+
+def replace(path):
+    filled(path.with_name("other.sqlite"), [])
+    move(path)
+    path.with_name("other.sqlite").rename(path)
+
+
+@pytest.mark.parametrize("gone", [Path.unlink, move, move_the_folder, replace])
+def test_a_store_that_goes_while_it_is_open_is_told_and_takes_its_results_along(tmp_path, gone):
+    path = tmp_path / "home" / "s.sqlite"
+    path.parent.mkdir()
+    with pytest.raises(HevoptError, match="deleted, moved or replaced") as found:
+        with open_store(path) as store:
+            store.begin({"study": "text"}, DESIGNS, PLAN)
+            store.check_place()
+            store.add([ok("0ecms")])
+            gone(path)
+            store.check_place()
+    assert found.value.exit_status == 4
+    moved = [p for p in tmp_path.rglob("*.sqlite") if "moved" in str(p)]
+    assert len(moved) == (gone is not Path.unlink)
+    assert not list(path.parent.glob("*-wal")) or gone is replace
+    for file in moved:
+        with open_to_read(file) as reader:
+            assert reader.counts()["ok"] == 1
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,8 @@ import os
 import pty
 import re
 import signal
+import socket
+import sqlite3
 import subprocess
 import sys
 import time
@@ -12,7 +14,17 @@ import time
 import pyarrow.parquet as pq
 import pytest
 from command_line import call
-from sweep_runs import gone, run, start, stored, sweep_here, table, wait_for_results, write_study
+from sweep_runs import (
+    gone,
+    run,
+    session,
+    start,
+    stored,
+    sweep_here,
+    table,
+    wait_for_results,
+    write_study,
+)
 
 from hevopt.commands import sweep_view
 from hevopt.sweeps.lock import locked
@@ -247,6 +259,98 @@ def test_asked_to_end_by_a_cluster_it_stores_all_it_has_and_leaves_no_process(tm
     assert gone(process)
     assert 0 < stored(store) < 2640
     assert sorted(p.name for p in tmp_path.iterdir()) == ["short.csv", "study.sqlite", "study.toml"]
+
+
+def test_a_sweep_under_nohup_goes_on_when_its_terminal_closes(tmp_path):
+    def nohup():
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    study, store = write_study(tmp_path, 3, 2), tmp_path / "study.sqlite"
+    process = start(study, "--jobs", "1", preexec_fn=nohup)
+    wait_for_results(process, store, 1)
+    process.send_signal(signal.SIGHUP)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    assert "12 cases of 12 designs: 12 ok" in out
+
+
+def test_a_store_that_is_deleted_stops_the_sweep_with_one_message(tmp_path):
+    study, store = write_study(tmp_path, 33, 40), tmp_path / "study.sqlite"
+    process = start(study, "--jobs", "1")
+    wait_for_results(process, store, 1)
+    store.unlink()
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 4 and out == ""
+    assert (
+        "study.sqlite: the store was deleted, moved or replaced" in err and "Traceback" not in err
+    )
+    assert gone(process)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["short.csv", "study.toml"]
+
+
+def test_the_first_signal_ends_a_sweep_whose_scheduler_says_nothing(tmp_path):
+    study = write_study(tmp_path, 2, 2)
+    with socket.create_server(("127.0.0.1", 0), backlog=50) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        process = start(study, "--backend", "dask", "--scheduler", address)
+        deadline = time.monotonic() + 120
+        while not any("hevopt.sweeps.probe" in command for command in session(process).values()):
+            assert time.monotonic() < deadline and process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=120)
+    assert process.returncode == 4 and err == "", err
+    assert "the same command goes on from there" in out
+    assert gone(process)
+
+
+def test_a_sweep_with_missing_cases_is_never_a_success(tmp_path, monkeypatch, capsys):
+    study, store = write_study(tmp_path, 2, 2), tmp_path / "study.sqlite"
+    sweep_here(study, store, "work", workers=1)
+
+    def begin_and_forget(*_, **__):
+        with sqlite3.connect(store) as connection:
+            connection.execute("DELETE FROM cases WHERE key = (SELECT min(key) FROM cases)")
+        return Progress(8)
+
+    monkeypatch.setattr("hevopt.sweeps.run.run_sweep", begin_and_forget)
+    status, out, _ = called(monkeypatch, capsys, study)
+    assert status == 4 and "1 cases have no result; the same command runs them" in out
+
+
+def test_names_that_are_no_utf8_are_swept_stored_and_reported(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / os.fsdecode(b"d\xe9")
+    folder.mkdir()
+    study = write_study(folder, 2, 2).rename(folder / os.fsdecode(b"c\xe9.toml"))
+    sweep_here(study, study.with_suffix(".sqlite"), "work", workers=1)
+    monkeypatch.setattr("hevopt.sweeps.run.run_sweep", lambda *_, **__: Progress(0))
+    status, out, err = called(monkeypatch, capsys, study, "--export", folder / "cases.csv")
+    assert (status, err) == (0, "") and "8 cases of 8 designs: 8 ok" in out
+    store, page = study.with_suffix(".sqlite"), folder / "page.html"
+    assert called(monkeypatch, capsys, "--status", store)[0] == 0
+    assert call(monkeypatch, capsys, "report", store, "--out", page)[::2] == (0, "")
+    assert r"c\udce9.toml" in page.read_text()
+
+
+NEITHER = """
+import sys
+sys.modules |= {"resource": None, "fcntl": None}
+from hevopt.cli import main
+sys.argv[0] = "hevopt"
+main()
+"""
+
+
+def test_a_store_is_reported_where_sweeps_cannot_run(swept, tmp_path):
+    def neither(*words):
+        command = [sys.executable, "-c", NEITHER, *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    done = neither("report", swept[1], "--out", tmp_path / "page.html")
+    assert done.returncode == 0, done.stderr
+    assert neither("sweep", "--status", swept[1]).returncode == 0
+    done = neither("sweep", swept[0])
+    assert done.returncode == 2 and "sweeps run on Linux" in done.stderr
 
 
 def test_progress_is_a_line_every_ten_seconds_where_there_is_no_terminal(capsys, monkeypatch):

@@ -10,6 +10,7 @@ import subprocess
 import threading
 import time
 from contextlib import contextmanager
+from functools import partial
 from random import Random
 
 import pytest
@@ -198,7 +199,9 @@ def test_a_read_only_folder_is_refused_before_anything_runs(study, tmp_path, mon
 @pytest.mark.long
 def test_ctrl_c_pressed_again_and_again_loses_nothing(study, whole, tmp_path):
     store = tmp_path / "s.sqlite"
-    process = start(study, "--jobs", "2", "--store", str(store))
+    # Whatever started the tests: a shell has what it runs in the background ignore Ctrl-C.
+    heard = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    process = start(study, "--jobs", "2", "--store", str(store), preexec_fn=heard)
     wait_for_results(process, store, 1)
     for _ in range(3):
         os.killpg(process.pid, signal.SIGINT)  # to all of them, as a terminal does
