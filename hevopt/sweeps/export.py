@@ -111,6 +111,8 @@ def _known_kinds() -> dict[str, type]:
         name: next(kind for kind in (get_args(hint) or (hint,)) if kind is not NoneType)
         for name, hint in get_type_hints(Row).items()
     }
+    # What is more than a number, such as a status, a store has as text.
+    kinds = {name: kind if kind in (int, float, bool) else str for name, kind in kinds.items()}
     return kinds | figures | {"design": int, NOX_WEIGHT: float, "error": str}
 
 
