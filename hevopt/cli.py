@@ -22,6 +22,7 @@ from hevopt.commands import (
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError, HevoptError, SolverError
+from hevopt.writing import files_told
 
 app = typer.Typer(
     name="hevopt",
@@ -69,38 +70,43 @@ app.add_typer(mapping.maps_app, name="maps")
 def main() -> None:
     """Entry point: a user's mistake is one message on stderr and a status, never a traceback."""
     keep_streams()
-    status, message = 0, ""
+    with files_told() as files:
+        status, message = _status_and_message()
+    if status == _INTERRUPTED:
+        message = f"interrupted; {files.told()}"
+    elif message and files.written:
+        message += f"\nhevopt: {files.told()}"
+    if message:
+        print(f"hevopt: {message}", file=sys.stderr)
+    raise SystemExit(status)
+
+
+def _status_and_message() -> tuple[int, str]:
     try:
         # An int where typer was left by typer.Exit, else what the command returned: None.
-        status = app(standalone_mode=False) or 0
+        return app(standalone_mode=False) or 0, ""
     except _UsageError as error:
         error.show()
-        status = error.exit_code
+        return error.exit_code, ""
     except HevoptError as error:
-        status, message = error.exit_status, f"error: {error}"
+        return error.exit_status, f"error: {error}"
     except OSError as error:
-        status, message = DataError.exit_status, f"error: {error}"
+        return DataError.exit_status, f"error: {error}"
     except UnicodeEncodeError as error:
         name = ascii(error.object[error.start : error.end])
-        status = DataError.exit_status
-        message = f"error: a name or text holds {name}, which is not UTF-8; rename the file"
-    except MemoryError:
-        status, message = (
-            SolverError.exit_status,
-            "error: not enough memory; choose a shorter cycle",
+        return (
+            DataError.exit_status,
+            f"error: a name or text holds {name}, which is not UTF-8; rename the file",
         )
+    except MemoryError:
+        return SolverError.exit_status, "error: not enough memory; choose a shorter cycle"
     except (KeyboardInterrupt, typer.Abort):
-        status = _INTERRUPTED
+        return _INTERRUPTED, ""
     except SystemError as error:
         # Compiled loops turn an interrupt into this.
         if not _comes_from_interrupt(error):
             raise
-        status = _INTERRUPTED
-    if status == _INTERRUPTED:
-        message = "interrupted; nothing was written"
-    if message:
-        print(f"hevopt: {message}", file=sys.stderr)
-    raise SystemExit(status)
+        return _INTERRUPTED, ""
 
 
 def _comes_from_interrupt(error: BaseException | None) -> bool:

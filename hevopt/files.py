@@ -4,16 +4,28 @@ A path is anything with a separator or a suffix; it is taken as it stands. A nam
 shipped files, which lie inside the installed package, or beside it in a checkout.
 """
 
+import json
+import re
+import stat
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from datetime import date, time
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from hevopt.errors import DataError, unknown_name
 
 _PACKAGE = Path(__file__).resolve().parent
-_SHOWN_CHARACTERS = 40
+_SHOWN_CHARACTERS, _FOLDERS_MAX = 40, 10
+# In quotes folders may have spaces.
+_ABSOLUTE = re.compile(
+    r"""(?<=')/(?:[^/'<>\n]+/)+(?=[^/'\n]*')|(?<=")/(?:[^/"<>\n]+/)+(?=[^/"\n]*")"""
+    r"""|(?<![\w.~/<>-])/(?:[^\s/'":;,<>]+/)+"""
+)
+# Two of these make one character, one alone cannot be written.
+_HALF_CHARACTER = re.compile(r"\\u[dD][89a-fA-F]")
 # Kind -> part of a name that people use -> shipped files of which that may speak.
 _ALSO_CALLED = {
     "cycles": {
@@ -36,12 +48,34 @@ def shipped_folder(kind: str) -> Path:
 def place_shown(path: Path, beside: Path | None = None) -> str:
     """A file as a report names it: a shipped one by its place among them, wherever they are installed.
 
-    Others as they were read; where a folder is given, from there, and by its name alone if it lies elsewhere.
+    Others as they were written, or from a folder on; an absolute one by its name alone, for a report may be handed
+    on and folders are the user's.
     """
     for root in filter(None, (shipped_folder("architectures").parent, beside)):
         if path.is_relative_to(root):
             return printable(path.relative_to(root).as_posix())
-    return printable(path.name if beside and path.is_absolute() else str(path))
+    return printable(path.name if path.is_absolute() else str(path))
+
+
+def places_shown(paths: Iterable[Path], beside: Path | None = None) -> dict[Path, str]:
+    """`place_shown` of each file; those of one name with as many of their folders as tell them apart."""
+    names = {path: place_shown(path, beside) for path in paths}
+    for parts in range(2, _FOLDERS_MAX):
+        counts = Counter(names.values())
+        alike = [path for path, name in names.items() if counts[name] > 1]
+        if not alike:
+            return names
+        names |= {path: printable("/".join(path.parts[-parts:])) for path in alike}
+    counts, seen = Counter(names.values()), Counter()
+    for path, name in names.items():
+        seen[name] += 1
+        names[path] = f"{name} ({seen[name]})" if counts[name] > 1 else name
+    return names
+
+
+def without_folders(text: str) -> str:
+    """The text with absolute paths as the names of their files."""
+    return _ABSOLUTE.sub("", text)
 
 
 def shipped_names(kind: str, suffix: str) -> list[str]:
@@ -125,22 +159,72 @@ def _close(what: str, name: str, known: Iterable[str], meant: Sequence[str] = ()
     return f"{what}: {', '.join(close)}; " if close else ""
 
 
+def check_regular(path: Path) -> None:
+    """DataError where a path is no file that ends: nothing, a folder, or a pipe or device, which may never end."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: cannot be read ({_reason(error)}); check the path") from None
+    if not stat.S_ISREG(mode):
+        what = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+        raise DataError(f"{path}: {what}, not a regular file; give a file")
+
+
+def read_bytes(path: Path, megabytes_max: int) -> bytes:
+    """Contents of a regular file of up to so many MB; DataError for anything else."""
+    check_regular(path)
+    most = megabytes_max * 1_000_000
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            contents = file.read(most + 1) if size <= most else b""
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    # A file such as those of /proc may hold more than it says.
+    if max(size, len(contents)) > most:
+        kind = f" for a {path.suffix} file" if path.suffix else ""
+        raise DataError(
+            f"{path}: {max(size, len(contents)) / 1e6:.1f} MB; allowed: up to {megabytes_max} MB{kind}; give a "
+            "smaller file"
+        )
+    return contents
+
+
+def starts_with(path: Path, mark: bytes) -> bool:
+    """Whether a regular file begins with these bytes; DataError where it cannot be read."""
+    check_regular(path)
+    try:
+        with path.open("rb") as file:
+            return file.read(len(mark)) == mark
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or "not a path"
+
+
 def read_text(path: Path, megabytes_max: int) -> str:
     """Contents of a text file; DataError where it cannot be read as UTF-8 text."""
     try:
-        megabytes = path.stat().st_size / 1e6
-        if megabytes > megabytes_max:
-            raise DataError(
-                f"{path}: {megabytes:.1f} MB; allowed: up to {megabytes_max} MB for a "
-                f"{path.suffix} file; give a smaller file"
-            )
-        return path.read_text(encoding="utf-8-sig")
+        return (
+            read_bytes(path, megabytes_max)
+            .decode("utf-8-sig")
+            .replace("\r\n", "\n")
+            .replace("\r", "\n")
+        )
     except UnicodeDecodeError as error:
         raise DataError(
             f"{path}: byte {error.start} is not UTF-8 text; save the file as UTF-8"
         ) from None
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+
+
+def loaded_json(text: str) -> Any:
+    """What a JSON text holds; ValueError or RecursionError where it is none, or half a character stands in it."""
+    contents = json.loads(text)
+    if _HALF_CHARACTER.search(text):
+        json.dumps(contents, ensure_ascii=False).encode()
+    return contents
 
 
 def shown(value: object) -> str:

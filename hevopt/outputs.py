@@ -1,7 +1,8 @@
 """Results as tidy tables in files, CSV, Parquet or JSON by the suffix: rows of a comparison, steps of a drive.
 
 Units stand in the column names. A CSV number is the shortest text that reads back to the same bits; what does not
-exist is an empty cell, null in the other two. JSON and Parquet carry inputs, versions and settings along.
+exist is an empty cell, null in the other two; CSV text that a spreadsheet would run has an apostrophe in front.
+JSON and Parquet carry inputs, versions and settings along.
 """
 
 import csv
@@ -21,7 +22,7 @@ from hevopt.files import printable
 from hevopt.problem import Problem, Trajectory
 from hevopt.rows import Row
 from hevopt.study import Comparison
-from hevopt.writing import check_writable, write_whole
+from hevopt.writing import check_writable, csv_cells, write_whole
 
 SUFFIXES = (".csv", ".parquet", ".json")
 Columns = Mapping[str, Sequence[Any]]
@@ -156,7 +157,7 @@ def _write_columns(path: Path, columns: Columns, about: Mapping[str, Any]) -> No
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     for values in zip(*columns.values(), strict=True):
-        writer.writerow(["" if v is None else v for v in map(_existing, values)])
+        writer.writerow(csv_cells(map(_existing, values)))
     write_whole(path, text.getvalue().encode())
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from hevopt import __version__
 from hevopt.architecture import Architecture
 from hevopt.cycle import Cycle
+from hevopt.files import places_shown
 
 # Whole numbers up to here are floats without loss.
 _EXACT_MAX = 2**53
@@ -102,3 +103,9 @@ def files_digests(
     return {
         str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in dict.fromkeys(paths)
     }
+
+
+def digests_shown(digests: Mapping[str, str]) -> dict[str, str]:
+    """File as a report names it -> SHA-256."""
+    names = places_shown(map(Path, digests))
+    return {names[Path(file)]: digest for file, digest in digests.items()}

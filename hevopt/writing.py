@@ -7,10 +7,20 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from hevopt.errors import DataError
+from hevopt.files import printable
+
+# Spreadsheets take text that begins like this for a formula, also behind spaces, and in wide letters.
+_SIGN = r"[=+\-@\uff1d\uff0b\uff0d\uff20][\s\S]"
+# In place of commas some split lines at other marks, whatever stands in quotes.
+_FORMULA = re.compile(rf"^(?=[\s\0\ufeff']*{_SIGN}|'*[\t\r\n])|(?<=[;|\t\r\n])(?='*{_SIGN})")
+_FORMULA_IN_COMMENT = re.compile(rf"(?<=[,;|\t])(?=[\s']*{_SIGN})")
+_NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?")
 
 try:
     import fcntl
@@ -45,6 +55,54 @@ def check_writable(path: Path) -> Path:
     raise DataError(f"{path}: cannot be written ({fault}); choose another place")
 
 
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Files that a command was asked for, and those of them and others that are written; paths as given."""
+
+    asked: dict[str, Path] = field(default_factory=dict)
+    written: dict[str, Path] = field(default_factory=dict)
+
+    def told(self) -> str:
+        """What is written and what is not, for the message of a command that did not come to its end."""
+        missing = [path for target, path in self.asked.items() if target not in self.written]
+        if not self.written:
+            return "nothing was written"
+        written = f"written: {_listed(self.written.values())}"
+        return f"{written}; not written: {_listed(missing)}" if missing else written
+
+
+def _listed(paths: Iterable[Path]) -> str:
+    return ", ".join(printable(str(path)) for path in paths)
+
+
+_asked: ContextVar[Asked | None] = ContextVar("_asked", default=None)
+
+
+@contextmanager
+def files_told() -> Iterator[Asked]:
+    """Which files the block is asked for by `check_outs`, and which it writes."""
+    found = Asked()
+    token = _asked.set(found)
+    try:
+        yield found
+    finally:
+        _asked.reset(token)
+
+
+def note_asked(path: Path) -> None:
+    """Count a file as asked for, where `files_told` asks."""
+    found = _asked.get()
+    if found is not None:
+        found.asked[os.path.realpath(path)] = path
+
+
+def note_written(path: Path) -> None:
+    """Count a file as written, where `files_told` asks."""
+    found = _asked.get()
+    if found is not None:
+        found.written[os.path.realpath(path)] = path
+
+
 def check_outs(outs: Mapping[str, Path | None], inputs: Iterable[str | Path] = ()) -> None:
     """DataError, before anything is computed, where a file cannot be written, is one that is read, or named twice.
 
@@ -63,6 +121,25 @@ def check_outs(outs: Mapping[str, Path | None], inputs: Iterable[str | Path] = (
         if target in taken:
             raise DataError(f"{taken[target]} and {option} name one file, {path}; choose two")
         taken[target] = option
+        note_asked(path)
+
+
+def csv_cells(values: Iterable[Any]) -> list[Any]:
+    """Values as a row of CSV: an apostrophe before every sign at which a spreadsheet would begin a formula.
+
+    Numbers stay as they are, and all other text. What begins with apostrophes and such a sign gets one more, so
+    that taking one away restores every text.
+    """
+    return [_as_text(value) if isinstance(value, str) else value for value in values]
+
+
+def csv_comment(text: str) -> str:
+    """A comment line of CSV, which a spreadsheet takes for cells all the same."""
+    return "# " + _FORMULA_IN_COMMENT.sub("'", text)
+
+
+def _as_text(text: str) -> str:
+    return text if _NUMBER.fullmatch(text) else _FORMULA.sub("'", text)
 
 
 def write_whole(path: Path, contents: bytes) -> None:
@@ -77,7 +154,12 @@ def write_whole(path: Path, contents: bytes) -> None:
             temporary.chmod(_mode_of(target))
             if fcntl is None:
                 file.close()
-            temporary.replace(target)
+            try:
+                temporary.replace(target)
+            finally:
+                # An interrupt may come after the file has its name.
+                if not temporary.exists():
+                    note_written(path)
     except OSError as error:
         raise DataError(
             f"{path}: cannot be written ({error.strerror}); choose another place"

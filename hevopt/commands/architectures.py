@@ -30,10 +30,12 @@ def new(
     """Write a commented architecture to edit, with the same results as the one it is like."""
     from hevopt.architecture_new import new_files
     from hevopt.files import encodable
-    from hevopt.writing import check_writable, write_whole
+    from hevopt.writing import check_writable, note_asked, write_whole
 
     files = new_files(name, like, out, listed(components) or ())
     check_writable(list(files)[-1])
+    for path in files:
+        note_asked(path)
     for path, text in files.items():
         if path.parent.name == "components":
             path.parent.mkdir(exist_ok=True)

@@ -1,5 +1,6 @@
 """What `hevopt compare` is told, the files it leaves behind, and what it prints."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hevopt.commands.reporting import command_line, write_files
 from hevopt.commands.terminal import show, write
 from hevopt.errors import DataError, HevoptError
+from hevopt.files import without_folders
 
 if TYPE_CHECKING:
     from hevopt.case import Case
@@ -21,6 +23,14 @@ if TYPE_CHECKING:
 _SHARED = {"nox_weight": 0.0, "allow_shortfall": False, "free_gear": False, "refine": False}
 
 
+def changes_shown(changes: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Car -> what was changed in it, files without folders that are the user's."""
+    return {
+        car: {k: without_folders(v) if isinstance(v, str) else v for k, v in of.items()}
+        for car, of in changes.items()
+    }
+
+
 @dataclass(frozen=True)
 class Job:
     """Cars on a cycle, and the settings that they are solved with."""
@@ -30,19 +40,26 @@ class Job:
     settings: "Settings"
 
     @cached_property
+    def inputs(self) -> dict[str, str]:
+        """File as it was read -> its digest."""
+        from hevopt.provenance import files_digests
+
+        own = [self.settings.file] if self.settings.file is not None else []
+        return dict(files_digests(self.cars.cars, [self.trace], own))
+
+    @cached_property
     def about(self) -> dict[str, Any]:
         """What a result comes from: digests of the files read, versions, and the settings made."""
-        from hevopt.provenance import files_digests, versions
+        from hevopt.provenance import digests_shown, versions
 
         settings = self.settings
-        own = [settings.file] if settings.file is not None else []
         return {
-            "inputs": dict(files_digests(self.cars.cars, [self.trace], own)),
+            "inputs": digests_shown(self.inputs),
             "versions": versions(),
             "settings": {
                 **{name: settings.get(name, default) for name, default in _SHARED.items()},
                 "horizon_s": settings.get("horizon_s", None),
-                "changes": self.cars.changes,
+                "changes": changes_shown(self.cars.changes),
                 "left_out": self.cars.left_out,
             },
         }
@@ -93,7 +110,7 @@ class Files:
         from hevopt.writing import check_outs
 
         tables = {"--out": self.out, "--out-steps": self.steps}
-        check_outs({"--report": self.page, "--save": self.save, **tables}, job.about["inputs"])
+        check_outs({"--report": self.page, "--save": self.save, **tables}, job.inputs)
         for path in tables.values():
             if path is not None:
                 check_table_file(path)

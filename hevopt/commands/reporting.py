@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hevopt.commands.terminal import write
+from hevopt.files import starts_with
 
 if TYPE_CHECKING:
     from hevopt.pages.results import Results
@@ -32,12 +33,7 @@ def report(
 
 def _page(file: Path) -> tuple[str, list[str]]:
     """The page of a saved comparison, or of a sweep where the file is an SQLite database; the files behind it."""
-    try:
-        with file.open("rb") as opened:
-            is_store = opened.read(len(_SQLITE)) == _SQLITE
-    except OSError:
-        is_store = False  # what is wrong with the file is for its reader to say
-    if is_store:
+    if starts_with(file, _SQLITE):
         from hevopt.pages.sweep import sweep_page
         from hevopt.pages.sweep_data import load_sweep
 

@@ -141,7 +141,7 @@ def run(
     job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
     if out is not None:
-        check_outs({"--out": out}, job.about["inputs"])
+        check_outs({"--out": out}, job.inputs)
         outputs.check_table_file(out)
     nox_weight = settings.get("nox_weight", 0.0)
     with Progress() as progress:
@@ -197,7 +197,7 @@ def table(
     settings = settings_of(_OPTIONS, given)
     job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
-    check_outs({"--out": out}, job.about["inputs"])
+    check_outs({"--out": out}, job.inputs)
     nox_weight = settings.get("nox_weight", 0.0)
     if nox_weight > 0:
         require_nox(car, f"nox_weight {nox_weight:g}")

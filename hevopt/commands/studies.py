@@ -265,12 +265,13 @@ def _check_csv(out: Path, inputs: Iterable[Path]) -> None:
 
 
 def _about(cars: "Cars", trace: "Cycle") -> dict[str, Any]:
-    from hevopt.provenance import files_digests, versions
+    from hevopt.commands.comparing import changes_shown
+    from hevopt.provenance import digests_shown, files_digests, versions
 
     return {
-        "inputs": dict(files_digests(cars.cars, [trace])),
+        "inputs": digests_shown(files_digests(cars.cars, [trace])),
         "versions": versions(),
-        "changes": cars.changes,
+        "changes": changes_shown(cars.changes),
     }
 
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from hevopt.architecture import Architecture
 from hevopt.cycle import Cycle
 from hevopt.sensitivity import Effect, unsolved
-from hevopt.writing import write_whole
+from hevopt.writing import csv_cells, write_whole
 
 _EFFECTS_NOTES = """fuel: charge-corrected, change against the car as given. elasticity: per cent of fuel (NOx) per
 per cent of the parameter. Everything is solved afresh for each value, thresholds of rules calibrated anew. NOx is
@@ -27,13 +27,14 @@ SHORTFALL_NOTE = "Where the car cannot follow, each value drives on with less th
 
 def write_front(out: Path, figures: Mapping[str, Any]) -> None:
     """Points and outer front in one table; what has no meaning for a line is empty."""
-    names = ["nox_weight", "strategy", "fuel_l_per_100km", "nox_mg_per_km", "bound_l_per_100km",
+    names = ["kind", "nox_weight", "strategy", "fuel_l_per_100km", "nox_mg_per_km", "bound_l_per_100km",
              "gap_percent", "certificate"]  # fmt: skip
     text = io.StringIO()
-    writer = csv.DictWriter(text, ["kind", *names], lineterminator="\n", extrasaction="ignore")
-    writer.writeheader()
-    writer.writerows({"kind": "plan", **point} for point in figures["points"])
-    writer.writerows({"kind": "outer front", **corner} for corner in figures["outer"])
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    lines = [{"kind": "plan", **point} for point in figures["points"]]
+    lines += [{"kind": "outer front", **corner} for corner in figures["outer"]]
+    writer.writerows(csv_cells(line.get(name) for name in names) for line in lines)
     write_whole(out, text.getvalue().encode())
 
 

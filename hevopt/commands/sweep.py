@@ -11,6 +11,7 @@ from hevopt.commands.sweep_view import SweepProgress, duration
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 from hevopt.files import printable
+from hevopt.writing import note_written
 
 if TYPE_CHECKING:
     from hevopt.sweeps.run import Execution, Plan, Progress
@@ -109,6 +110,8 @@ def sweep(
         except (KeyboardInterrupt, Stopped):
             done = None
         progress.finish()
+        if store.exists():
+            note_written(store)
         end(store, done, export)
 
 

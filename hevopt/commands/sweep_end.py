@@ -76,7 +76,8 @@ def show_status(path: Path) -> None:
 
     with open_to_read(path) as reader:
         meta, counts = reader.meta(), reader.counts()
-        write(f"study {printable(meta.get('study_file', 'unknown'))}, begun {meta.get('begun')}")
+        file, begun = (printable(meta.get(name, "unknown")) for name in ("study_file", "begun"))
+        write(f"study {file}, begun {begun}")
         write(counted(counts))
         _say_standing(reader)
 

@@ -22,6 +22,7 @@ from hevopt.imports.resample import (
     speeds_at,
 )
 from hevopt.units import KMH_PER_MPS
+from hevopt.writing import csv_comment
 
 Array = NDArray[np.float64]
 
@@ -173,7 +174,7 @@ def _text(
         *([f"{len(repairs)} repairs, by line of that file:"] if repairs else []),
         *(f"  {text}" for text in repairs),
     ]
-    lines = [f"# {printable(comment)}" for comment in comments]
+    lines = [csv_comment(printable(comment)) for comment in comments]
     lines.append(",".join(columns))
     for row in zip(*(_written(name, values) for name, values in columns.items()), strict=True):
         lines.append(",".join(row))

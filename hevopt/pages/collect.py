@@ -11,7 +11,7 @@ from hevopt.architecture import Architecture
 from hevopt.case import Case
 from hevopt.cycle import Cycle
 from hevopt.errors import DataError
-from hevopt.files import place_shown
+from hevopt.files import without_folders
 from hevopt.pages.energy import energy_of
 from hevopt.pages.maps import engine_map, machine_map
 from hevopt.pages.operation import (
@@ -33,7 +33,7 @@ from hevopt.pages.results import (
     Trace,
 )
 from hevopt.problem import Plan, Trajectory
-from hevopt.provenance import files_digests, versions
+from hevopt.provenance import digests_shown, files_digests, versions
 from hevopt.published import published_beside
 from hevopt.rows import Row as StudyRow
 from hevopt.rows import is_neutral
@@ -101,12 +101,9 @@ class Collector:
             nox_weight=comparison.nox_weight,
             free_gear=comparison.free_gear,
             end_asked=dict(comparison.end_asked),
-            command=command,
-            changes=list(changes),
-            inputs={
-                place_shown(Path(file)): d
-                for file, d in files_digests(cars, cycles, others).items()
-            },
+            command=without_folders(command),
+            changes=[without_folders(line) for line in changes],
+            inputs=digests_shown(files_digests(cars, cycles, others)),
             versions=versions(),
             operations=list(OPERATIONS),
             causal=[name for name, strategy in STRATEGIES.items() if strategy.causal],
@@ -118,7 +115,9 @@ class Collector:
                 )
                 for row in comparison.rows
             ],
-            failures={name: str(error) for name, error in comparison.failures.items()},
+            failures={
+                name: without_folders(str(error)) for name, error in comparison.failures.items()
+            },
             published=[
                 PublishedFigure(**statement._asdict())
                 for statement in (published_beside(comparison) if published else [])

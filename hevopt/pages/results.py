@@ -7,13 +7,17 @@ import gzip
 import json
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, InstanceOf, PlainSerializer
+from pydantic import BeforeValidator, Field, InstanceOf, PlainSerializer
 
 from hevopt.certificate import Claim
 from hevopt.datafile import FileModel
 from hevopt.status import Status
 
 FORMAT = "hevopt comparison 2"
+# Far beyond any figure, and far from where sums and squares of floats end.
+_NUMBER_MAX = 1e100
+Number = Annotated[float, Field(ge=-_NUMBER_MAX, le=_NUMBER_MAX)]
+Whole = Annotated[int, Field(ge=-(2**53), le=2**53)]
 # Text in JSON.
 SavedStatus = Annotated[InstanceOf[Status], BeforeValidator(Status.read), PlainSerializer(str)]
 SavedClaim = Annotated[InstanceOf[Claim], BeforeValidator(Claim.read), PlainSerializer(str)]
@@ -25,20 +29,20 @@ class RowFigures(FileModel):
     architecture: str
     strategy: str
     status: SavedStatus
-    fuel_l_per_100km: float | None
-    delta_fuel_percent: float | None
-    co2_g_per_km: float | None
-    nox_mg_per_km: float | None
-    delta_nox_percent: float | None
-    soc_start: float | None
-    soc_end: float | None
-    delta_energy_percent: float | None
-    fuel_corrected_l_per_100km: float | None
-    engine_starts: int | None
-    bound_l_per_100km: float | None
-    gap_percent: float | None
+    fuel_l_per_100km: Number | None
+    delta_fuel_percent: Number | None
+    co2_g_per_km: Number | None
+    nox_mg_per_km: Number | None
+    delta_nox_percent: Number | None
+    soc_start: Number | None
+    soc_end: Number | None
+    delta_energy_percent: Number | None
+    fuel_corrected_l_per_100km: Number | None
+    engine_starts: Whole | None
+    bound_l_per_100km: Number | None
+    gap_percent: Number | None
     certificate: SavedClaim | None
-    solve_s: float | None
+    solve_s: Number | None
 
 
 class MapFigures(FileModel):
@@ -50,12 +54,12 @@ class MapFigures(FileModel):
     """
 
     name: str
-    speed_radps: list[float]
-    torque_nm: list[float]
-    efficiency: list[list[float | None]]
-    nox_kgpj: list[list[float | None]] | None
-    limit_nm: list[float]
-    least_nm: list[float | None]
+    speed_radps: list[Number]
+    torque_nm: list[Number]
+    efficiency: list[list[Number | None]]
+    nox_kgpj: list[list[Number | None]] | None
+    limit_nm: list[Number]
+    least_nm: list[Number | None]
 
 
 class CarFigures(FileModel):
@@ -66,16 +70,16 @@ class CarFigures(FileModel):
     """
 
     name: str
-    time_s: list[float]
-    step_s: list[float]
-    speed_mps: list[float]
-    wheel_power_w: list[float]
-    missing_torque_nm: list[float]
-    soc_min: float
-    soc_max: float
-    heating_value_jpkg: float
-    price_kgpj: float
-    certified_gap_percent: float | None
+    time_s: list[Number]
+    step_s: list[Number]
+    speed_mps: list[Number]
+    wheel_power_w: list[Number]
+    missing_torque_nm: list[Number]
+    soc_min: Number
+    soc_max: Number
+    heating_value_jpkg: Number
+    price_kgpj: Number
+    certified_gap_percent: Number | None
     engine: MapFigures
     machine: MapFigures
 
@@ -83,17 +87,17 @@ class CarFigures(FileModel):
 class Trace(FileModel):
     """What a row does, (time,), but soc: (time + 1,). operation: index into the names of `operations`."""
 
-    soc: list[float]
-    operation: list[int]
-    engine_gear: list[int]
-    machine_gear: list[int]
-    fuel_kg: list[float]
-    nox_kg: list[float]
-    battery_power_w: list[float]
-    engine_torque_nm: list[float]
-    engine_speed_radps: list[float]
-    machine_torque_nm: list[float]
-    machine_speed_radps: list[float]
+    soc: list[Number]
+    operation: list[Whole]
+    engine_gear: list[Whole]
+    machine_gear: list[Whole]
+    fuel_kg: list[Number]
+    nox_kg: list[Number]
+    battery_power_w: list[Number]
+    engine_torque_nm: list[Number]
+    engine_speed_radps: list[Number]
+    machine_torque_nm: list[Number]
+    machine_speed_radps: list[Number]
 
 
 class Link(FileModel):
@@ -101,14 +105,14 @@ class Link(FileModel):
 
     source: str
     target: str
-    energy_j: float
+    energy_j: Number
 
 
 class Item(FileModel):
     """One entry of the energy balance."""
 
     name: str
-    energy_j: float
+    energy_j: Number
 
 
 class Energy(FileModel):
@@ -120,7 +124,7 @@ class Energy(FileModel):
     links: list[Link]
     taken: list[Item]
     spent: list[Item]
-    residual_j: float
+    residual_j: Number
     of_which: list[Item]
 
 
@@ -128,10 +132,10 @@ class Share(FileModel):
     """What one mode of operation takes of a cycle; NOx None where the engine has no data on it."""
 
     operation: str
-    time_s: float
-    distance_m: float
-    fuel_kg: float
-    nox_kg: float | None
+    time_s: Number
+    distance_m: Number
+    fuel_kg: Number
+    nox_kg: Number | None
 
 
 class Member(FileModel):
@@ -140,11 +144,11 @@ class Member(FileModel):
     neutral: keeps the SOC window, and its end charge is that asked within 1 % of the fuel's energy, as of rows
     """
 
-    threshold_w: float
-    nox_cap_kgps: float | None = None
-    corrected_l_per_100km: float
-    nox_mg_per_km: float | None
-    surplus_j: float
+    threshold_w: Number
+    nox_cap_kgps: Number | None = None
+    corrected_l_per_100km: Number
+    nox_mg_per_km: Number | None
+    surplus_j: Number
     neutral: bool
     chosen: bool
 
@@ -159,10 +163,10 @@ class Detail(FileModel):
     trace: Trace
     energy: Energy
     shares: list[Share]
-    limits: dict[str, int]
-    engine_on_s: list[float]
-    engine_off_s: list[float]
-    equivalence_kgpj: float | None
+    limits: dict[str, Whole]
+    engine_on_s: list[Number]
+    engine_off_s: list[Number]
+    equivalence_kgpj: Number | None
     calibration: list[Member]
     solver: list[str]
 
@@ -186,21 +190,21 @@ class PublishedFigure(FileModel):
 class ParetoPoint(FileModel):
     """A plan on the front, with the weights on NOx for which none found is better; see `pareto.figures_of`."""
 
-    nox_weight: float
-    nox_weights: list[float]
+    nox_weight: Number
+    nox_weights: list[Number]
     strategy: str
-    fuel_l_per_100km: float
-    nox_mg_per_km: float
-    bound_l_per_100km: float
-    gap_percent: float | None
+    fuel_l_per_100km: Number
+    nox_mg_per_km: Number
+    bound_l_per_100km: Number
+    gap_percent: Number | None
     certificate: str
 
 
 class Corner(FileModel):
     """A corner of the outer front."""
 
-    nox_mg_per_km: float
-    fuel_l_per_100km: float
+    nox_mg_per_km: Number
+    fuel_l_per_100km: Number
 
 
 class ParetoFront(FileModel):
@@ -210,7 +214,7 @@ class ParetoFront(FileModel):
     cycle: str
     points: list[ParetoPoint]
     outer: list[Corner]
-    gap_percent: float
+    gap_percent: Number
 
 
 class Sensitivity(FileModel):
@@ -220,13 +224,13 @@ class Sensitivity(FileModel):
     strategy: str
     parameter: str
     unit: str
-    values: list[float]
-    fuel_l_per_100km: list[float | None]
-    delta_percent: list[float | None]
-    nox_mg_per_km: list[float | None]
-    delta_nox_percent: list[float | None]
-    elasticity: float | None
-    elasticity_nox: float | None
+    values: list[Number]
+    fuel_l_per_100km: list[Number | None]
+    delta_percent: list[Number | None]
+    nox_mg_per_km: list[Number | None]
+    delta_nox_percent: list[Number | None]
+    elasticity: Number | None
+    elasticity_nox: Number | None
     reasons: list[str | None] | None = None
 
 
@@ -240,11 +244,11 @@ class Results(FileModel):
 
     format: Literal["hevopt comparison 2"] = FORMAT
     cycle: str
-    distance_m: float
+    distance_m: Number
     reference: str | None
-    nox_weight: float
+    nox_weight: Number
     free_gear: bool
-    end_asked: dict[str, float]
+    end_asked: dict[str, Number]
     command: str
     changes: list[str]
     inputs: dict[str, str]

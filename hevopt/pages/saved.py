@@ -1,6 +1,5 @@
 """Reading a saved comparison: unpacked within bounds, and checked before anything is drawn from it."""
 
-import json
 import zlib
 from pathlib import Path
 from typing import Any
@@ -8,10 +7,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from hevopt.errors import DataError
-from hevopt.files import printable
+from hevopt.files import loaded_json, printable, read_bytes
 from hevopt.pages.results import FORMAT, CarFigures, Results, Row
 
-_MEGABYTES_MAX = 500
+# Unpacked; a page of 20 000 steps and 65 rows takes 80 MB and 15 million numbers.
+_MEGABYTES_MAX, _VALUES_MAX, _LISTS_MAX, _TEXTS_MAX = 200, 20_000_000, 2_000_000, 4_000_000
+_ADVICE = "give a file written by hevopt compare --save"
 _MAGIC = b"\x1f\x8b"
 _FAULTS_LISTED = 5
 _ROUNDING_PERCENT = 1e-6
@@ -37,8 +38,7 @@ def load_results(path: Path) -> Results:
         ]
     if results is None or faults:
         raise DataError(
-            f"{path}: not a saved comparison ({'; '.join(faults[:_FAULTS_LISTED])}); give a file written by "
-            "hevopt compare --save"
+            f"{path}: not a saved comparison ({'; '.join(faults[:_FAULTS_LISTED])}); {_ADVICE}"
         )
     return results
 
@@ -106,22 +106,36 @@ def _faults_of_row(results: Results, row: Row) -> list[str]:
     return faults
 
 
-def _contents(path: Path) -> Any:
-    advice = "give a file written by hevopt compare --save"
+def _contents(path: Path) -> dict[str, Any]:
     try:
-        packed = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-    try:
-        unpacker = zlib.decompressobj(wbits=31)
-        text = packed
-        if packed.startswith(_MAGIC):
-            text = unpacker.decompress(packed, _MEGABYTES_MAX * 1_000_000)
-            if not unpacker.eof:
-                raise DataError(f"{path}: cut short, or beyond {_MEGABYTES_MAX} MB; {advice}")
-        contents = json.loads(text)
+        text = _unpacked(path)
+        _check_room(path, text)
+        contents = loaded_json(text.decode())
     except (zlib.error, ValueError, RecursionError):
-        raise DataError(f"{path}: neither JSON nor JSON packed with gzip; {advice}") from None
+        raise DataError(f"{path}: neither JSON nor JSON packed with gzip; {_ADVICE}") from None
     if not isinstance(contents, dict) or contents.get("format") != FORMAT:
-        raise DataError(f"{path}: not in the form {FORMAT!r}; {advice} of this version")
+        raise DataError(f"{path}: not in the form {FORMAT!r}; {_ADVICE} of this version")
     return contents
+
+
+def _unpacked(path: Path) -> bytes:
+    contents = read_bytes(path, _MEGABYTES_MAX)
+    if not contents.startswith(_MAGIC):
+        return contents
+    unpacker = zlib.decompressobj(wbits=31)
+    text = unpacker.decompress(contents, _MEGABYTES_MAX * 1_000_000)
+    if not unpacker.eof:
+        raise DataError(f"{path}: cut short, or beyond {_MEGABYTES_MAX} MB unpacked; {_ADVICE}")
+    return text
+
+
+def _check_room(path: Path, text: bytes) -> None:
+    """DataError where JSON would take many times its own size: of lists, names and short numbers there are few."""
+    counted = (
+        ("values", text.count(b","), _VALUES_MAX),
+        ("lists and tables", text.count(b"[") + text.count(b"{"), _LISTS_MAX),
+        ("texts", text.count(b'"') // 2, _TEXTS_MAX),
+    )
+    for what, count, most in counted:
+        if count > most:
+            raise DataError(f"{path}: {count} {what}; allowed: up to {most}; {_ADVICE}")

@@ -3,13 +3,14 @@
 import base64
 import gzip
 import json
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from hevopt.files import place_shown
+from hevopt.files import places_shown
 from hevopt.pages.page import render
 from hevopt.pages.sweep_alerts import alerts
 from hevopt.pages.sweep_data import (
@@ -100,7 +101,8 @@ def _facts(sweep: Sweep) -> dict[str, str]:
 def _inputs(sweep: Sweep) -> list[tuple[str, str]]:
     """Files and their digests, each from the study's folder on."""
     folder = _study_file(sweep).parent
-    return [(place_shown(Path(file), folder), digest) for file, digest in sweep.inputs.items()]
+    names = places_shown(map(Path, sweep.inputs), folder)
+    return [(names[Path(file)], digest) for file, digest in sweep.inputs.items()]
 
 
 def _entries(text: str | None) -> dict[str, str]:
@@ -147,7 +149,7 @@ def _values(figures: Figures, n: int) -> list[tuple[str, float | None]]:
 def _pruned(sweep: Sweep) -> list[dict[str, Any]]:
     """The first of the discarded designs, those first that came closest to being solved."""
     place = {int(number): n for n, number in enumerate(sweep.figures.number)}
-    first = sorted(sweep.pruned, key=lambda p: (p.bound / p.objective, p.design))[:PRUNED_LISTED]
+    first = sorted(sweep.pruned, key=lambda p: (p.excess, p.design))[:PRUNED_LISTED]
     return [
         {
             "design": p.design,
@@ -156,7 +158,7 @@ def _pruned(sweep: Sweep) -> list[dict[str, Any]]:
             "bound": p.bound,
             "incumbent": p.incumbent,
             "objective": p.objective,
-            "above": 100 * (p.bound / p.objective - 1),
+            "above": 100 * p.excess if isfinite(p.excess) else None,
         }
         for p in first
     ]

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.errors import DataError
-from hevopt.files import printable
+from hevopt.files import printable, without_folders
 from hevopt.status import OK, Status
 from hevopt.sweeps.export import csv_of
 from hevopt.sweeps.jobs import BOUND, NOX_WEIGHT
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.reading import Record, inputs_in, open_to_read
 from hevopt.sweeps.reasons import Reasons
+from hevopt.writing import csv_cells
 
 Array = NDArray[np.float64]
 Scalar = bool | int | float | str
@@ -135,7 +136,15 @@ def load_sweep(path: Path) -> Sweep:
         pruned = [found for found in reader.pruned() if found.design in unsolved]
         few = tally.counts.total() <= CASES_MAX
         cases_csv = csv_of(reader) if few else None
-        return Sweep(printable(path.name), reader.meta(), figures, tally, pruned, cases_csv)
+        return Sweep(
+            printable(path.name), _meta_shown(reader.meta()), figures, tally, pruned, cases_csv
+        )
+
+
+def _meta_shown(meta: Mapping[str, str]) -> dict[str, str]:
+    """What a page may hand on of it; the files themselves are named by the page."""
+    files = ("inputs", "study_file")
+    return {k: text if k in files else without_folders(text) for k, text in meta.items()}
 
 
 def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
@@ -160,7 +169,7 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
         best[place] = min(best.get(place, found), found, key=_order)
         tally.contradictions += found.bound > found.objective * (1 + _ROUNDING)
         nox_cost = found.objective - found.fuel
-        if nox_cost > _SHARE_MIN * found.objective:
+        if nox_cost > _SHARE_MIN * found.objective and record.nox_weight * found.nox > 0:
             worths.append(nox_cost / (record.nox_weight * found.nox))
     numbers, cycles = sorted(designs), list(tally.cycles)
     solved = [_mean_solved([best.get((n, cycle)) for cycle in cycles]) for n in numbers]
@@ -261,9 +270,9 @@ def designs_csv(figures: Figures) -> bytes:
     }
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow(csv_cells(columns))
     lists = list(columns.values())
-    writer.writerows([of[n] for of in lists] for n in order.tolist())
+    writer.writerows(csv_cells(of[n] for of in lists) for n in order.tolist())
     return text.getvalue().encode()
 
 

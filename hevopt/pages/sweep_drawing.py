@@ -92,7 +92,7 @@ def _following(figures: Figures, values: Array) -> Array:
 
 def _pruned_places(figures: Figures, pruned: Sequence[Pruned]) -> dict[str, Any]:
     """Points of the edges of pruned designs' half planes, at the NOx of the designs that they lost to."""
-    first = sorted(pruned, key=lambda p: (p.bound / p.objective, p.design))[:POINTS_MAX]
+    first = sorted(pruned, key=lambda p: (p.excess, p.design))[:POINTS_MAX]
     place = {int(number): n for n, number in enumerate(figures.number)}
     own = np.array([place[p.design] for p in first], dtype=np.intp)
     nox = figures.nox[[place[p.incumbent] for p in first]] if first else np.empty(0)

@@ -15,7 +15,7 @@ from hevopt.rows import Row
 from hevopt.sweeps.jobs import BOUND, FIGURES, NOX_WEIGHT
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.reading import OUTCOMES, Reader
-from hevopt.writing import check_writable, write_whole
+from hevopt.writing import check_writable, csv_cells, write_whole
 
 _LEADING = ("design", "cycle", "strategy", "outcome")
 _PRUNED = ("design_bound_l_per_100km", "incumbent", "incumbent_objective_l_per_100km")
@@ -60,10 +60,10 @@ def csv_of(reader: Reader) -> bytes:
     text = io.TextIOWrapper(out, encoding="utf-8", newline="")
     writer = csv.writer(text, lineterminator="\n")
     names = list(_kinds(reader))
-    writer.writerow(map(printable, names))
+    writer.writerow(csv_cells(map(printable, names)))
     for line in _lines(reader):
         values = [line.get(name) for name in names]
-        writer.writerow([repr(v) if isinstance(v, float) else v for v in values])
+        writer.writerow(csv_cells(values))
     text.flush()
     return out.getvalue()
 

@@ -39,6 +39,11 @@ class Pruned:
     incumbent: int
     objective: float
 
+    @property
+    def excess(self) -> float:
+        """How far the bound is above the objective, as a share of that; infinite above one of 0."""
+        return self.bound / self.objective - 1 if self.objective else inf
+
 
 @dataclass(frozen=True, slots=True)
 class Wave:

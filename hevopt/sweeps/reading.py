@@ -11,9 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.errors import DataError
+from hevopt.files import check_regular, places_shown, without_folders
+from hevopt.sweeps.limits import check_side_files, contents_faults, set_limits
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.store import check_kind, told
-from hevopt.sweeps.stored import OUTCOMES, check_case, check_meta, check_pruned, loaded
+from hevopt.sweeps.stored import (
+    OUTCOMES,
+    check_case,
+    check_meta,
+    check_pruned,
+    damaged,
+    known_figures,
+    loaded,
+)
 from hevopt.writing import temporary_folder
 
 _RECORDS = """
@@ -22,6 +32,12 @@ SELECT plan.design, designs.parameters, plan.cycle, plan.strategy, plan.nox_weig
             ELSE 'missing' END AS outcome, cases.row, cases.error, cases.seconds
 FROM plan JOIN designs ON designs.number = plan.design LEFT JOIN cases ON cases.key = plan.key
 LEFT JOIN pruned ON pruned.design = plan.design
+"""
+
+_ABSOLUTE = """
+SELECT cycle FROM plan WHERE cycle LIKE '/%' AND length(cycle) < 5000 UNION
+SELECT value FROM designs, json_each(CASE WHEN json_valid(parameters) THEN parameters ELSE '{}' END)
+WHERE type = 'text' AND value LIKE '/%' AND length(value) < 5000
 """
 
 
@@ -47,10 +63,14 @@ def inputs_in(meta: Mapping[str, str]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """A store as it was at one moment; `open_to_read` makes one."""
+    """A store as it was at one moment; `open_to_read` makes one.
+
+    names: absolute path of a cycle or component -> as a report names it
+    """
 
     path: Path
     connection: sqlite3.Connection
+    names: Mapping[str, str]
 
     def meta(self) -> dict[str, str]:
         """What is known of the sweep: study (its text), command, created, begun ..."""
@@ -88,7 +108,21 @@ class Reader:
                     values[name] = loaded(self.path, values[name])
                 check_case(self.path, values, keys)
                 keys = values["parameters"]
-                yield Record(**values)
+                yield self._record(values)
+
+    def _record(self, values: dict[str, Any]) -> Record:
+        parameters = {
+            key: self.names.get(value, value) if isinstance(value, str) else value
+            for key, value in values["parameters"].items()
+        }
+        error = values["error"]
+        shown = {
+            "parameters": parameters,
+            "cycle": self.names.get(values["cycle"], values["cycle"]),
+            "row": known_figures(values["row"]),
+            "error": None if error is None else without_folders(error),
+        }
+        return Record(**values | shown)
 
     def pruned(self) -> list[Pruned]:
         """The designs discarded unsolved, by number."""
@@ -103,18 +137,30 @@ class Reader:
 @contextmanager
 def open_to_read(path: Path) -> Iterator[Reader]:
     """The store at a path as it is now, whatever is written to it meanwhile."""
-    try:
-        found = path.is_file()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-    if not found:
+    if not os.path.lexists(path):
         raise DataError(f"{path}: there is no such store; check the path, or run the sweep first")
+    check_regular(path)
+    check_side_files(path)
     with ExitStack() as stack:
         connection = _connected(path, stack)
-        check_kind(path, connection)
         with told(path):
             connection.execute("BEGIN")
-        yield Reader(path, connection)
+        check_kind(path, connection)
+        with told(path):
+            faults = contents_faults(connection, path)
+            if faults:
+                raise damaged(path, faults[0])
+            names = _names_shown(connection)
+        yield Reader(path, connection, names)
+
+
+def _names_shown(connection: sqlite3.Connection) -> dict[str, str]:
+    """Of files named by absolute paths: how a report names each, from the study's folder on."""
+    found = connection.execute("SELECT value FROM meta WHERE name = 'study_file'").fetchone()
+    folder = Path(found[0]).parent if found and isinstance(found[0], str) else None
+    texts = [text for (text,) in connection.execute(_ABSOLUTE) if isinstance(text, str)]
+    names = places_shown(map(Path, texts), folder)
+    return {text: names[Path(text)] for text in texts}
 
 
 def _connected(path: Path, stack: ExitStack) -> sqlite3.Connection:
@@ -144,6 +190,7 @@ def _opened(path: Path, how: str, stack: ExitStack) -> sqlite3.Connection:
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?{how}", uri=True, timeout=60.0)
     stack.callback(connection.close)
     connection.isolation_level = None
+    set_limits(connection, path)
     connection.execute("PRAGMA query_only = ON")
     connection.execute("SELECT count(*) FROM sqlite_master")
     return connection

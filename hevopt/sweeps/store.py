@@ -26,8 +26,9 @@ from typing import Any
 from hevopt.errors import DataError, HevoptError
 from hevopt.files import encodable, printable
 from hevopt.sweeps.jobs import Outcome, Planned
+from hevopt.sweeps.limits import check_side_files, schema_faults
 from hevopt.sweeps.prune import Pruned
-from hevopt.sweeps.stored import loaded
+from hevopt.sweeps.stored import damaged, loaded
 from hevopt.writing import check_writable
 
 SCHEMA = 1
@@ -186,6 +187,7 @@ class Store:
 def open_store(path: Path) -> Iterator[Store]:
     """A store to write to, made where there is none; `locked` first. DataError where that cannot be."""
     target = check_writable(path)
+    check_side_files(target)
     with told(path):
         connection = sqlite3.connect(target, timeout=60.0, isolation_level=None)
     try:
@@ -209,7 +211,7 @@ def open_store(path: Path) -> Iterator[Store]:
 
 
 def check_kind(path: Path, connection: sqlite3.Connection) -> None:
-    """DataError where a database is not a store, or one of a later hevopt."""
+    """DataError where a database is not a store, one of a later hevopt, or has other tables."""
     with told(path):
         application = connection.execute("PRAGMA application_id").fetchone()[0]
         version = connection.execute("PRAGMA user_version").fetchone()[0]
@@ -220,6 +222,10 @@ def check_kind(path: Path, connection: sqlite3.Connection) -> None:
             f"{path}: written in format {version}, this hevopt knows {SCHEMA}; "
             f"use a {'newer' if version > SCHEMA else 'former'} version, or name another store"
         )
+    with told(path):
+        faults = schema_faults(connection, _TABLES)
+    if faults:
+        raise damaged(path, faults[0])
 
 
 @contextmanager
@@ -236,6 +242,8 @@ def _advice(error: sqlite3.Error) -> str:
     name, said = getattr(error, "sqlite_errorname", ""), printable(str(error))
     if name.startswith("SQLITE_NOTADB"):
         return "not a store of a sweep, nor an SQLite file; name another"
+    if name.startswith("SQLITE_INTERRUPT"):
+        return "damaged (reading it takes more work than its size can need); keep a copy, and name another"
     if name.startswith("SQLITE_CORRUPT"):
         return f"damaged ({said}); keep a copy, and recover it with the tools of SQLite"
     if name.startswith("SQLITE_FULL") or name.startswith("SQLITE_IOERR"):

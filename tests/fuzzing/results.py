@@ -8,9 +8,11 @@ from fuzzing.seed import SHORT_CYCLE, Seed
 
 _STUDY = f"""architecture = "C2"
 cycles = ["{SHORT_CYCLE}"]
-strategies = ["bound"]
+strategies = ["conventional", "bound"]
+allow_shortfall = true
 [parameters]
 machine.power_max_w = [1e4, 2e4]
+engine = ["engine_diesel_1600", "engine_diesel_1600_steep_nox"]
 nox_weight = [0, 10]
 """
 
@@ -24,6 +26,7 @@ def results() -> list[Seed]:
         Seed("sweep.sqlite", _store(), (
             ("report", "sweep.sqlite", "--out", "page.html"), ("sweep", "--status", "sweep.sqlite"),
             ("sweep", "--store", "sweep.sqlite", "--export", "cases.csv"),
+            ("sweep", "--store", "sweep.sqlite", "--export", "cases.parquet"),
         )),
     ]  # fmt: skip
 
@@ -40,6 +43,8 @@ def _saved() -> bytes:
 
 
 def _store() -> bytes:
+    from hevopt.sweeps.jobs import Outcome
+    from hevopt.sweeps.prune import Pruned
     from hevopt.sweeps.run import begin, plan_of
     from hevopt.sweeps.store import open_store
     from hevopt.sweeps.study_file import read_study
@@ -51,6 +56,11 @@ def _store() -> bytes:
         plan = plan_of(read_study(study))
         with open_store(path) as store:
             begin(plan, store, "hevopt sweep sweep.toml")
-            for job in plan.jobs:
+            for job in plan.jobs[:-1]:
                 store.add(run_job(job))
+            last = plan.jobs[-1]
+            store.add([Outcome(last.cases[0].key, "failed", None, "no such plan\nand why", 1.0)])
+            keys = {case.key for case in last.cases}
+            design = max(case.design for case in plan.planned if case.key in keys)
+            store.prune([Pruned(design, 9.0, 0, 8.0)])
         return path.read_bytes()

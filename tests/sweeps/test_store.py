@@ -8,28 +8,16 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from small_stores import DESIGNS, PLAN, ok, row
 from sweep_runs import check_sound
 
 from hevopt.errors import DataError, HevoptError
 from hevopt.sweeps import store as store_module
-from hevopt.sweeps.jobs import Outcome, Planned
+from hevopt.sweeps.jobs import Outcome
 from hevopt.sweeps.lock import locked
 from hevopt.sweeps.prune import Pruned
 from hevopt.sweeps.reading import open_to_read
 from hevopt.sweeps.store import open_store
-
-DESIGNS = [(0, {"a": 0.1, "nox_weight": 0}), (1, {"a": 0.2, "nox_weight": 0})]
-PLAN = [Planned(n, "nedc", s, 0.0, f"{n}{s}") for n in (1, 0) for s in ("ecms", "dp")]
-
-
-def row(figure):
-    return {"strategy": "dp", "status": "ok", "fuel_l_per_100km": figure, "fuel_corrected_l_per_100km": figure,
-            "objective_l_per_100km": figure, "bound_l_per_100km": figure,
-            "objective_bound_l_per_100km": figure}  # fmt: skip
-
-
-def ok(key, figure=1 / 3):
-    return Outcome(key, "ok", row(figure), None, 0.5)
 
 
 def filled(path, outcomes):
@@ -52,7 +40,7 @@ def test_what_is_stored_is_read_to_the_last_bit_in_the_order_of_designs(tmp_path
     assert [(r.design, r.strategy, r.outcome) for r in found] == [
         (0, "dp", "missing"), (0, "ecms", "ok"), (1, "dp", "failed"), (1, "ecms", "infeasible"),
     ]  # fmt: skip
-    assert found[1].row == row(0.1 + 0.2)
+    assert found[1].row == row(0.1 + 0.2, "ecms")
     assert found[2].error == "no; 'quoted'\n" and found[2].seconds == 2.0
     assert found[0].parameters == {"a": 0.1, "nox_weight": 0}
     assert list(tmp_path.iterdir()) == [path]

@@ -72,9 +72,13 @@
     draw("sensitivity");
   }
 
+  // As `writing.csv_cells`: an apostrophe before a sign at which a spreadsheet would begin a formula.
+  const FORMULA = /^(?=[\s\0\ufeff']*[=+\-@\uff1d\uff0b\uff0d\uff20][^]|'*[\t\r\n])|(?<=[;|\t\r\n])(?='*[=+\-@\uff1d\uff0b\uff0d\uff20][^])/g;
+  const inert = (text) => text.replace(FORMULA, "'");
+
   function csv() {
     const keys = Object.keys(Shown.results.rows[0].figures);
-    const cell = (value) => (value === null ? "" : typeof value === "number" ? String(value) : `"${String(value).replace(/"/g, '""')}"`);
+    const cell = (value) => (value === null ? "" : typeof value === "number" ? String(value) : `"${inert(String(value)).replace(/"/g, '""')}"`);
     return [keys.join(","), ...Shown.results.rows.map((row) => keys.map((key) => cell(row.figures[key])).join(","))].join("\n") + "\n";
   }
 
