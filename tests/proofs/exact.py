@@ -4,7 +4,7 @@ Of the problem only what its user gave is read: curves, limits, table, start and
 can deliver is found by looking at many charges of the window.
 """
 
-from math import sqrt
+from math import inf, sqrt
 
 # A power that is the voltage's peak up to rounding is at the peak.
 _PEAK_ROUNDING = 1e-9
@@ -110,11 +110,11 @@ class Limits:
 
 
 def every_plan(problem):
-    """(cost, stored energy at the end, furthest outside the window) of every plan that simulate may accept."""
+    """(cost, stored energy at the end, furthest outside the window, < 0 inside) of every plan that simulate may accept."""
     table, pack = problem.table, Pack(problem.battery)
     low, high = pack.energy(problem.battery.soc_min), pack.energy(problem.battery.soc_max)
     slack = max(WINDOW_ROUNDING * (high - low), 4e-12 * high)
-    plans = [(0.0, pack.energy(problem.soc_start), problem.start_mode, 0.0)]
+    plans = [(0.0, pack.energy(problem.soc_start), problem.start_mode, -inf)]
     for k in range(len(table.step_s)):
         step_s = float(table.step_s[k])
         controls = [
