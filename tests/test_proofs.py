@@ -70,6 +70,14 @@ def test_the_attack_would_find_a_tangent_beyond_the_window(monkeypatch):
     assert any("prices is" in fault and "above a plan" in fault for fault in faults)
 
 
+def test_the_attack_would_find_an_end_called_unreachable(monkeypatch):
+    def never(*arguments):
+        raise InfeasibleError("no")
+
+    monkeypatch.setattr(dp, "reach_of", never)
+    assert any("calls a reachable end" in fault for fault in attack(range(20_000, 20_010)))
+
+
 def test_the_enumeration_has_no_part_of_the_battery_from_hevopt():
     source = Path(RUN.with_name("exact.py")).read_text()
     assert "hevopt" not in source.split('"""', 2)[2]

@@ -11,7 +11,7 @@ from hevopt.lower_dp import end_slack_j, lower_bound_kg
 from hevopt.prices import one_price_dual
 from hevopt.problem import Problem, Reject
 from hevopt.step_prices import costate_dual, lp_dual
-from hevopt.strategies import a_ecms, convex, dp, mpc
+from hevopt.strategies import a_ecms, convex, dp, ecms, mpc
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -55,7 +55,7 @@ def _faults_of(problem: Problem, every_strategy: bool, nodes: int) -> list[str]:
         )
         if worst[0] > 4 * len(problem.table.step_s) * EPSILON * abs(worst[1]):
             faults.append(f"{kind} is {worst[0]:.3g} kg above a plan of {worst[1]:.9g} kg")
-    strategies = [a_ecms, *([mpc, convex] if every_strategy else [])]
+    strategies = [ecms, a_ecms, *([mpc, convex] if every_strategy else [])]
     for strategy in strategies:
         faults += _strategy_faults(problem, strategy, exact, scale)
     return faults

@@ -110,7 +110,10 @@ class Limits:
 
 
 def every_plan(problem):
-    """(cost, stored energy at the end, furthest outside the window, < 0 inside) of every plan that simulate may accept."""
+    """(cost, stored energy at the end, furthest outside the window) of every plan that simulate may accept.
+
+    A plan that keeps inside is outside by less than 0.
+    """
     table, pack = problem.table, Pack(problem.battery)
     low, high = pack.energy(problem.battery.soc_min), pack.energy(problem.battery.soc_max)
     slack = max(WINDOW_ROUNDING * (high - low), 4e-12 * high)

@@ -42,6 +42,8 @@ def main() -> int:
         for fault in attack(range(n, n + 1), given.nodes):
             faults += 1
             print(fault, flush=True)
+        if (n + 1) % 500 == 0:
+            print(f"{n + 1 - given.first} done", file=sys.stderr, flush=True)
     print(f"{given.count} problems, {faults} faults")
     return 1 if faults else 0
 
