@@ -430,7 +430,7 @@ GOOD = (
         (GOOD, ["--like", "engine_diesl"], ["engine_diesl", "engine_diesel_1600"]),
         (GOOD, [*LIKE, "--full-load", "none.csv"], ["none.csv", "no such file"]),
         (GOOD, [*LIKE, "--motoring", "short.csv"], ["covers 1000 to 3000 rpm, the map 800 to 5000"]),
-        (GOOD, [*LIKE, "--rows", "speed", "--sheet", "a"], ["not an .xlsx workbook"]),
+        (GOOD, [*LIKE, "--rows", "speed", "--sheet", "a"], ["not an Excel workbook"]),
         ("n [rpm],T [Nm],fuel [g/h]\n800,0,400\n5000,0,900\n", [*LIKE], ["2 points; a map needs 4 or more"]),
         ("n [rpm],T [Nm],fuel [g/h]\n8,9,40\n9,9,50\n50,9,90\n90,9,98\n", [*LIKE], ["all points have one torque"]),
         ("n [rpm],T [Nm],fuel [g/h]\n800,9,400\n2000,50,900\n3000,91,1500\n", [*LIKE], ["3 points", "4 or more"]),
