@@ -11,6 +11,7 @@ import typer
 from hevopt import __version__
 from hevopt.commands import (
     architectures,
+    coasting,
     importing,
     listing,
     mapping,
@@ -54,7 +55,7 @@ for command in (
     listing.strategies,
     reporting.report,
     architectures.validate,
-    mapping.coastdown,
+    coasting.coastdown,
     sweep.sweep,
     studies.pareto,
     studies.sensitivity,

@@ -18,7 +18,8 @@ from typing import Any
 from hevopt.errors import DataError, unknown_name
 
 _PACKAGE = Path(__file__).resolve().parent
-_SHOWN_CHARACTERS, _FOLDERS_MAX = 40, 10
+_SHOWN_CHARACTERS = 40
+_FOLDERS_MAX = 10
 # In quotes folders may have spaces.
 _ABSOLUTE = re.compile(
     r"""(?<=')/(?:[^/'<>\n]+/)+(?=[^/'\n]*')|(?<=")/(?:[^/"<>\n]+/)+(?=[^/"\n]*")"""

@@ -1,15 +1,24 @@
-"""`hevopt maps import` and `hevopt coastdown`: measured data to component files."""
+"""`hevopt maps import`: points of a test bench to component files."""
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from hevopt.commands.components import (
+    ColumnOption,
+    LikeOption,
+    SetOption,
+    SheetOption,
+    UnitOption,
+    digests,
+    own_file,
+    values_of,
+)
 from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
-from hevopt.files import is_path, printable, shown
+from hevopt.files import printable
 
 if TYPE_CHECKING:
     from hevopt.imports.map_import import Request
@@ -18,24 +27,6 @@ if TYPE_CHECKING:
 _HEAD = "Measured map, written by hevopt maps import."
 
 maps_app = typer.Typer(help="Measured maps of engines and machines.", rich_markup_mode=None)
-
-_ColumnOption = Annotated[
-    list[str] | None,
-    typer.Option("--column", help="ROLE=NAME: which column holds what; may be repeated."),
-]
-_UnitOption = Annotated[
-    list[str] | None,
-    typer.Option("--unit", help="ROLE=UNIT: the unit of a column; may be repeated."),
-]
-_SheetOption = Annotated[str | None, typer.Option("--sheet", help="Sheet of an Excel workbook.")]
-_LikeOption = Annotated[
-    str | None,
-    typer.Option("--like", help="Name or file of a component that gives the remaining keys."),
-]
-_SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", help="KEY=VALUE of the component's file; may be repeated."),
-]
 
 
 @maps_app.callback()
@@ -51,7 +42,7 @@ def import_map(
     kind: Annotated[
         Literal["engine", "machine"], typer.Option("--kind", help="engine or machine.")
     ],
-    like: _LikeOption = None,
+    like: LikeOption = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Component file to write (default: FILE's name with .toml)."),
@@ -68,16 +59,16 @@ def import_map(
     displacement_cm3: Annotated[
         float | None, typer.Option("--displacement-cm3", help="Displacement of the engine.")
     ] = None,
-    given: _SetOption = None,
-    column: _ColumnOption = None,
-    unit: _UnitOption = None,
+    given: SetOption = None,
+    column: ColumnOption = None,
+    unit: UnitOption = None,
     rows: Annotated[
         Literal["speed", "torque"] | None,
         typer.Option(
             "--rows", help="What a grid's first column holds, or a square matrix's first index."
         ),
     ] = None,
-    sheet: _SheetOption = None,
+    sheet: SheetOption = None,
 ) -> None:
     """A component file, with what the map covers, from measured points of an engine or a machine.
 
@@ -93,7 +84,7 @@ def import_map(
     from hevopt.imports.map_report import coverage
     from hevopt.writing import check_outs, write_whole
 
-    values = _values(given)
+    values = values_of(given)
     if displacement_cm3 is not None:
         if "displacement_cm3" in values:
             raise DataError("--displacement-cm3 and --set displacement_cm3 are one key; give one")
@@ -103,13 +94,13 @@ def import_map(
     sources = [file, *(source.path for source in request.extra.values())]
     out = _beside(file, ".toml") if out is None else out
     plot = _beside(out, ".png")
-    check_outs({"--out": out, "the plot": plot}, [*sources, *_own_file(like)])
+    check_outs({"--out": out, "the plot": plot}, [*sources, *own_file(like)])
     _check_own(out, plot)
     imported = import_engine(request) if kind == "engine" else import_machine(request)
     said = coverage(imported)
     head = [
         _HEAD,
-        *_digests(sources),
+        *digests(sources),
         *imported.notes,
         *said,
     ]
@@ -125,83 +116,6 @@ def import_map(
         write(f"  {printable(origin)}: {printable(keys)}")
     write("\n".join(said))
     write(f"component written to {out}, plot to {plot}")
-
-
-def coastdown(
-    files: Annotated[list[Path], typer.Argument(help="Tables of time and speed.")],
-    mass_kg: Annotated[
-        float | None, typer.Option("--mass-kg", help="Mass of the car as tested, driver included.")
-    ] = None,
-    rotating_mass_kg: Annotated[
-        float | None,
-        typer.Option("--rotating-mass-kg", help="What wheels and shafts add to the inertia."),
-    ] = None,
-    wheel_inertia_kgm2: Annotated[
-        float | None, typer.Option("--wheel-inertia-kgm2", help="Instead: of all wheels together.")
-    ] = None,
-    tyre_radius_m: Annotated[
-        float | None, typer.Option("--tyre-radius-m", help="Rolling radius of the tyres.")
-    ] = None,
-    like: _LikeOption = None,
-    given: _SetOption = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Car file to write.")] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="Picture to write: .png, .svg or .pdf.")
-    ] = None,
-    directions: Annotated[
-        str | None, typer.Option("--directions", help="Of the runs in order, such as +,-,+,-.")
-    ] = None,
-    column: _ColumnOption = None,
-    unit: _UnitOption = None,
-    sheet: _SheetOption = None,
-) -> None:
-    """C0, C1, C2 of the road load from coast-downs in both directions, with confidence intervals."""
-    from hevopt.imports.coastdown import fit_road_load
-    from hevopt.imports.coastdown_car import car_base, car_contents, check_mass, said_of_mass
-    from hevopt.imports.coastdown_report import results
-    from hevopt.imports.coastdown_runs import ROLES, ROLES_WITH_UNIT, read_runs
-    from hevopt.imports.component_text import component_text
-    from hevopt.writing import check_outs, write_whole
-
-    check_outs({"--out": out, "--plot": plot}, [*files, *_own_file(like)])
-    kind = None if plot is None else _picture_kind(plot)
-    values = _values(given) | {
-        key: value
-        for key, value in (
-            ("wheel_inertia_kgm2", wheel_inertia_kgm2),
-            ("tyre_radius_m", tyre_radius_m),
-        )
-        if value is not None
-    }
-    car = car_base(like, values, rotating_mass_kg)
-    check_mass(mass_kg)
-    ways = None if directions is None else _ways(directions)
-    columns = pairs("--column", column, ROLES)
-    units = pairs("--unit", unit, ROLES_WITH_UNIT)
-    runs, notes = read_runs(files, columns, units, ways, sheet)
-    fit = fit_road_load(runs, mass_kg + car.rotating_kg)
-    said = results(runs, fit, mass_kg, car.rotating_kg)
-    contents = None if out is None else car_contents(fit, car, mass_kg)
-    said += said_of_mass(mass_kg) if contents else []
-    for note in notes:
-        write(f"  {printable(note)}")
-    write("\n".join(said))
-    if contents is not None:
-        head = [
-            "Car with a road load from coast-downs, written by hevopt coastdown.",
-            *_digests(files),
-            *notes,
-            *said,
-        ]
-        write_whole(out, component_text(head, contents, car.origins).encode())
-        write(f"car written to {out}")
-    else:
-        write(f"no {'car ' * (plot is not None)}file written; --out FILE writes the car")
-    if plot is not None:
-        from hevopt.imports.figures import coastdown_figure
-
-        write_whole(plot, coastdown_figure(runs, fit, kind))
-        write(f"plot written to {plot}")
 
 
 def _request(
@@ -230,50 +144,10 @@ def _request(
     return Request(Source(file, sheet, columns, units, rows), others, like, values)
 
 
-def _values(texts: list[str] | None) -> dict[str, Any]:
-    """KEY=VALUE as a mapping; a value that is no TOML value is text."""
-    values = {}
-    for text in texts or []:
-        key, mark, value = text.partition("=")
-        if not mark or not key.strip():
-            raise DataError(f"--set {shown(text)}: KEY=VALUE is needed, such as idle_rpm=800")
-        try:
-            read = tomllib.loads(f"x = {value}")
-            values[key.strip()] = read["x"] if len(read) == 1 else value.strip()
-        except (ValueError, RecursionError):
-            values[key.strip()] = value.strip()
-    return values
-
-
-def _ways(text: str) -> list[int]:
-    known = {"+": 1, "+1": 1, "1": 1, "-": -1, "-1": -1}
-    words = [word.strip() for word in text.split(",")]
-    wrong = [word for word in words if word not in known]
-    if wrong:
-        raise DataError(
-            f"--directions {shown(text)}: {shown(wrong[0])}; allowed: + and -, such as +,-,+,-"
-        )
-    return [known[word] for word in words]
-
-
-def _picture_kind(path: Path) -> str:
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
-        raise DataError(
-            f"--plot {printable(str(path))}: the name ends with no kind of picture; allowed: .png, .svg and .pdf"
-        )
-    return kind
-
-
 def _beside(path: Path, suffix: str) -> Path:
     if not path.stem or path.stem == "..":
         raise DataError(f"{path}: not the name of a file")
     return path.with_suffix(suffix)
-
-
-def _own_file(like: str | None) -> list[str]:
-    """The file that --like names; none where it is a shipped component."""
-    return [like] if like is not None and is_path(like, ".toml") else []
 
 
 def _check_own(out: Path, plot: Path) -> None:
@@ -288,15 +162,3 @@ def _check_own(out: Path, plot: Path) -> None:
                 f"{path} exists, and hevopt maps import has not written it; give another name with --out, or "
                 "remove it yourself"
             )
-
-
-def _digests(sources: list[Path]) -> list[str]:
-    """Name, SHA-256 and program of every input, for the head of what is written."""
-    import hashlib
-
-    from hevopt import __version__
-
-    return [
-        f"From {path.name}, SHA-256 {hashlib.sha256(path.read_bytes()).hexdigest()}, hevopt {__version__}."
-        for path in sources
-    ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hevopt.commands.terminal import write
-from hevopt.files import starts_with
+from hevopt.files import encodable, starts_with
 
 if TYPE_CHECKING:
     from hevopt.pages.results import Results
@@ -63,4 +63,4 @@ def write_files(results: "Results", page: Path | None, saved: Path | None) -> li
 
 def command_line() -> str:
     """The command as it was given, quoted for a shell."""
-    return shlex.join(["hevopt", *sys.argv[1:]])
+    return encodable(shlex.join(["hevopt", *sys.argv[1:]]))
