@@ -80,8 +80,8 @@ def _run_end(low, high, start, rise, whole):
 def lower_backward(
     first, cost, switch_kg, allowed, terminal, breaks, offset, rise, floor_kg, unreachable_kg
 ):
-    """(mode, node) lower bound of the cost-to-go before the first step."""
-    steps, modes, nodes = first.shape[0], first.shape[1] - 1, len(terminal)
+    """(mode, node) lower bound of the cost-to-go before the first step; terminal: the same after the last."""
+    steps, modes, nodes = first.shape[0], first.shape[1] - 1, terminal.shape[1]
     pieces = len(breaks) - 1
     furthest = 0.0
     for move in offset.flat:
@@ -91,9 +91,7 @@ def lower_backward(
     padded = np.empty((modes, nodes + 2 * pad))
     best = np.empty((modes, nodes))
     defect = np.empty(nodes - 1)
-    value = np.empty((modes, nodes))
-    for m in range(modes):
-        value[m] = terminal
+    value = terminal.copy()
     for k in range(steps - 1, -1, -1):
         for n in range(modes):
             for j in range(pad):

@@ -42,6 +42,17 @@ class Choices(NamedTuple):
         """(entry,) a value per step, repeated for each of the step's entries."""
         return np.repeat(per_step, self.first[:, -1] - self.first[:, 0])
 
+    def part(self, begin: int, end: int) -> "Choices":
+        """Those of the steps begin <= k < end."""
+        low, high = self.first[begin, 0], self.first[end - 1, -1]
+        return self._replace(
+            first=self.first[begin:end] - low,
+            control=self.control[low:high],
+            cost_kg=self.cost_kg[low:high],
+            power_w=self.power_w[low:high],
+            step_s=self.step_s[begin:end],
+        )
+
     @property
     def modes(self) -> int:
         """Number of modes."""

@@ -31,6 +31,8 @@ By induction from the end V at the first step, at the start's energy and mode, i
 ends with at least the asked charge.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,6 +45,7 @@ from hevopt.step_prices import line_above, steep, window_cells
 Array = NDArray[np.float64]
 _PIECES = 16
 _PIECES_CURVED = 256
+_PART_MOVES = 2**24
 # Slope below the window and for missing end charge, in multiples of what charge is worth.
 _STEEPNESS = 4.0
 
@@ -62,10 +65,12 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
     slope = _STEEPNESS * max(price_kgpj, 1e-12)
     terminal = slope * np.maximum(end - grid, 0.0)
     unreachable = _unreachable_kg(choices, terminal)
-    value = kernels.lower_backward(
-        choices.first, choices.cost_kg, choices.switch_kg, choices.switch_allowed, terminal,
-        *_move_bounds(problem, choices, grid, cell), slope * cell, unreachable,
-    )  # fmt: skip
+    value = np.tile(terminal, (choices.modes, 1))
+    for part in _parts(choices):
+        value = kernels.lower_backward(
+            part.first, part.cost_kg, part.switch_kg, part.switch_allowed, value,
+            *_move_bounds(problem, part, grid, cell), slope * cell, unreachable,
+        )  # fmt: skip
     bound = float(np.interp(problem.start_j, grid, value[problem.start_mode]))
     most = abs(unreachable) + slope * 4.0 * (grid[-1] - grid[0])
     return bound - 16.0 * EPSILON * choices.steps * most
@@ -74,6 +79,13 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
 def end_slack_j(problem: Problem) -> float:
     """How much less than the asked end charge a bound of this kind still covers: what a window is granted."""
     return problem.battery.granted_window_j[1] - problem.window_j[1]
+
+
+def _parts(choices: Choices) -> Iterator[Choices]:
+    """Choices of consecutive steps, the last ones first: what is known of the moves of a part is some 0.1 GB."""
+    length = max(_PART_MOVES * choices.steps // (len(choices.cost_kg) * _PIECES_CURVED), 1)
+    for end in range(choices.steps, 0, -length):
+        yield choices.part(max(end - length, 0), end)
 
 
 def _move_bounds(

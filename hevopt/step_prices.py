@@ -26,6 +26,8 @@ other batteries the window is cut into cells; in each, r is at least its value a
 lowest resistance.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,6 +42,8 @@ from hevopt.problem import Problem, Trajectory
 
 Array = NDArray[np.float64]
 CELLS = 256
+# Longer drives are given to the linear program in parts: its time grows faster than their length.
+_LP_STEPS, _LP_OVERLAP = 4000, 1000
 # Share of the highest U² by which a curve may leave a straight line and still be taken for one.
 _STRAIGHT = 1e-7
 
@@ -104,16 +108,44 @@ def steep(choices: Choices, battery: BatteryArrays) -> NDArray[np.bool_]:
 def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     """(time,) multipliers of the energy steps: minimise cost over mixtures of controls, x in the window.
 
+    Long drives are given to it in parts, from the end. Each reaches into the next by some steps, counts what is
+    left there at the price that the next has found for it, and is believed up to where the next begins.
+    """
+    choices = without_dominated(bounded_choices(problem))
+    count = -(-choices.steps // _LP_STEPS)
+    ends = np.arange(count + 1) * choices.steps // count
+    price = np.zeros(choices.steps)
+    low, _ = problem.window_j
+    for begin, end in reversed(list(pairwise(ends))):
+        reach = min(end + _LP_OVERLAP, choices.steps)
+        wanted = (problem.end_min_j, 0.0) if reach == choices.steps else (low, price[reach - 1])
+        along = rollout.energy_j[begin:reach], rollout.battery_power_w[begin:reach]
+        found = _lp_part(problem, choices.part(begin, reach), *along, *wanted)
+        price[begin:end] = found[: end - begin]
+    return price
+
+
+def _lp_part(
+    problem: Problem,
+    choices: Choices,
+    energy_j: Array,
+    power_w: Array,
+    end_min_j: float,
+    end_price_kgpj: float,
+) -> Array:
+    """(time,) multipliers of consecutive steps, what is left at their end being at least end_min_j and priced.
+
+    energy_j, power_w: (time,) along a rollout, whose first stored energy is where they start
+
     The mixtures of a step cost the lower hull of its controls' cost over drain; from the corner of least drain
     the hull falls segment by segment, ever less steeply, so that segments bounded by 0 and 1 are all it needs.
     """
     from scipy.optimize import linprog
     from scipy.sparse import csr_array
 
-    choices = without_dominated(bounded_choices(problem))
     step = choices.spread(np.arange(choices.steps))
     drain_j, keep_j = kernels.linear_steps(
-        choices.first, choices.power_w, choices.step_s, rollout.energy_j, rollout.battery_power_w,
+        choices.first, choices.power_w, choices.step_s, energy_j, power_w,
         problem.battery.within_window(),
     )  # fmt: skip
     order = np.lexsort((choices.cost_kg, drain_j, step))
@@ -137,17 +169,18 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
         ),
         shape=(steps, segments + steps),
     )
-    offset = ((1.0 - keep_j) * rollout.energy_j[:-1] - least_j) / scale_j
-    offset[0] += keep_j[0] * problem.start_j / scale_j
+    offset = ((1.0 - keep_j) * energy_j - least_j) / scale_j
+    offset[0] += keep_j[0] * energy_j[0] / scale_j
     bounds = np.empty((segments + steps, 2))
     bounds[:segments] = 0.0, 1.0
     bounds[segments:] = low / scale_j, high / scale_j
-    bounds[-1, 0] = problem.end_min_j / scale_j
+    bounds[-1, 0] = end_min_j / scale_j
     # In units of the steps' own costs, so that the solver's tolerance is a share of them.
     unit_kg = float(np.max(np.abs(np.diff(cost_kg)[inside]), initial=0.0)) or 1.0
+    cost = np.concatenate([np.diff(cost_kg)[inside] / unit_kg, np.zeros(steps)])
+    cost[-1] -= end_price_kgpj * scale_j / unit_kg
     result = linprog(
-        np.concatenate([np.diff(cost_kg)[inside] / unit_kg, np.zeros(steps)]),
-        A_ub=rows, b_ub=offset, bounds=bounds, method="highs",
+        cost, A_ub=rows, b_ub=offset, bounds=bounds, method="highs",
     )  # fmt: skip
     if result.status != 0:
         raise SolverError(f"HiGHS stopped with status {result.status}: {result.message}")

@@ -1,6 +1,7 @@
 """`hevopt compare`, `run` and `table`: one cycle, solved."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -66,6 +67,7 @@ def compare(
     """Strategies on architectures over one cycle, each with its certified bound."""
     from hevopt import study
     from hevopt.commands.comparing import Files, Job, show_comparison
+    from hevopt.commands.forecast import say_how_long
     from hevopt.cycle import load_cycle
     from hevopt.study_file import Settings, cars_of, read_study, settings_of
 
@@ -82,19 +84,19 @@ def compare(
     job = Job(cars_of(settings), load_cycle(settings.get("cycle", "nedc")), settings)
     files = Files(out, steps, page, save, fronts, effects)
     files.check(job)
+    compared = partial(
+        study.compare,
+        architectures=job.cars.cars,
+        strategies=settings.get("strategies", None),
+        nox_weight=settings.get("nox_weight", 0.0),
+        allow_shortfall=settings.get("allow_shortfall", False),
+        free_gear=settings.get("free_gear", False),
+        refine=settings.get("refine", False),
+        horizon_s=settings.get("horizon_s", None),
+    )
+    say_how_long(job.trace, compared)
     with Progress() as progress:
-        comparison = study.compare(
-            job.trace,
-            job.cars.cars,
-            settings.get("strategies", None),
-            nox_weight=settings.get("nox_weight", 0.0),
-            allow_shortfall=settings.get("allow_shortfall", False),
-            free_gear=settings.get("free_gear", False),
-            refine=settings.get("refine", False),
-            horizon_s=settings.get("horizon_s", None),
-            progress=progress,
-            observe=files.observe,
-        )
+        comparison = compared(job.trace, progress=progress, observe=files.observe)
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
     show_comparison(job, comparison, json=json)
     lines, of_files = files.write(job, comparison)
@@ -128,6 +130,7 @@ def run(
     from hevopt import outputs, report, study
     from hevopt.case import prepare
     from hevopt.commands.comparing import Job
+    from hevopt.commands.forecast import say_how_long
     from hevopt.cycle import load_cycle
     from hevopt.strategies import strategy_named
     from hevopt.study_file import cars_of, settings_of
@@ -144,15 +147,17 @@ def run(
         check_outs({"--out": out}, job.inputs)
         outputs.check_table_file(out)
     nox_weight = settings.get("nox_weight", 0.0)
+    prepared = partial(
+        prepare,
+        car,
+        nox_weight=nox_weight,
+        allow_shortfall=settings.get("allow_shortfall", False),
+        refine=settings.get("refine", False),
+    )
+    say_how_long(trace, lambda piece: study.run_case(prepared(piece), strategy, horizon))
     with Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
-        case = prepare(
-            car,
-            trace,
-            nox_weight=nox_weight,
-            allow_shortfall=settings.get("allow_shortfall", False),
-            refine=settings.get("refine", False),
-        )
+        case = prepared(trace)
         progress(f"{car.name}: {strategy}", 0, 1)
         row, plan, trajectory = study.run_case(case, strategy, horizon)
     comparison = study.Comparison(
