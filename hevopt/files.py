@@ -220,6 +220,22 @@ def read_text(path: Path, megabytes_max: int) -> str:
         ) from None
 
 
+def dumped_json(contents: Any) -> str:
+    """Compact JSON that `loaded_json` reads: half characters, of names that are no UTF-8, as Python spells them."""
+    text = json.dumps(contents, allow_nan=False, separators=(",", ":"))
+    if _HALF_CHARACTER.search(text):
+        return json.dumps(_encodable(contents), allow_nan=False, separators=(",", ":"))
+    return text
+
+
+def _encodable(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {encodable(key): _encodable(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_encodable(inner) for inner in value]
+    return encodable(value) if isinstance(value, str) else value
+
+
 def loaded_json(text: str) -> Any:
     """What a JSON text holds; ValueError or RecursionError where it is none, or half a character stands in it."""
     contents = json.loads(text)

@@ -7,6 +7,7 @@ import pytest
 
 from hevopt.errors import DataError
 from hevopt.files import (
+    dumped_json,
     loaded_json,
     place_shown,
     places_shown,
@@ -48,6 +49,12 @@ def test_a_text_with_half_a_character_is_no_json_and_a_whole_one_is():
     for text in ('"\\ud83d"', '{"\\udead": 1}', "[" * 100_000, "{"):
         with pytest.raises((ValueError, RecursionError)):
             loaded_json(text)
+
+
+def test_names_that_are_no_utf8_are_saved_as_python_spells_them():
+    for text in ("c\udce9.csv", "\U0001f697", "\\udce9"):
+        spelt = text.encode("utf-8", "backslashreplace").decode()
+        assert loaded_json(dumped_json({text: [text, 1.5]})) == {spelt: [spelt, 1.5]}
 
 
 def test_a_file_is_named_as_written_and_never_with_folders_above(tmp_path):

@@ -4,13 +4,13 @@ Rows hold every figure at full precision; traces and maps are rounded, see `coll
 """
 
 import gzip
-import json
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, InstanceOf, PlainSerializer
 
 from hevopt.certificate import Claim
 from hevopt.datafile import FileModel
+from hevopt.files import dumped_json
 from hevopt.status import Status
 
 FORMAT = "hevopt comparison 2"
@@ -264,5 +264,4 @@ class Results(FileModel):
 
     def packed(self) -> bytes:
         """The contents of the file; the same results give the same bytes."""
-        text = json.dumps(self.model_dump(), allow_nan=False, separators=(",", ":"))
-        return gzip.compress(text.encode(), compresslevel=6, mtime=0)
+        return gzip.compress(dumped_json(self.model_dump()).encode(), compresslevel=6, mtime=0)

@@ -9,6 +9,7 @@ from time import monotonic
 
 from hevopt.cycle import load_cycle
 from hevopt.errors import DataError
+from hevopt.files import dumped_json
 from hevopt.provenance import code_digest, digest, files_digests, versions
 from hevopt.sweeps.backends import Run, workers
 from hevopt.sweeps.child import Terms
@@ -130,7 +131,7 @@ def begin(plan: Plan, store: Store, command: str) -> None:
         "study_digest": digest(text),
         "code_digest": code_digest(),
         "versions": json.dumps(versions()),
-        "inputs": json.dumps(plan.inputs),
+        "inputs": dumped_json(dict(plan.inputs)),
         "command": command,
         "study_file": str(study.source.absolute()),
     }
