@@ -189,6 +189,7 @@ class _Team:
                 raise fault
             none = "and no other could" if self._losses else "no worker can"
             raise WorkersLost(f"{self._loss}{none} be started: {_said(fault)}")
+        _hear_signals()
         return opened.result()
 
     def _send(self, pool: Pool, number: int, jobs: list[Job]) -> Future:
@@ -226,6 +227,14 @@ class _Team:
     def end(self) -> None:
         self._close()
         self._server.end()
+
+
+def _hear_signals() -> None:
+    """Take signals back: at one that asks a sweep to end, Ray's handler tells of a crash, and aborts in the end."""
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if callable(handler := signal.getsignal(number)):
+                signal.signal(number, handler)
 
 
 def _answer_of(terms: Terms, jobs: list[Job]) -> list[Outcome] | HevoptError:

@@ -248,14 +248,16 @@ def test_a_cluster_that_does_not_answer_is_told(swept, monkeypatch, capsys, tmp_
     assert status == 2 and "no Dask cluster at 'tcp://127.0.0.1:9'" in err
 
 
-def test_asked_to_end_by_a_cluster_it_stores_all_it_has_and_leaves_no_process(tmp_path):
+@pytest.mark.parametrize("backend", ["loky", pytest.param("ray", marks=pytest.mark.long)])
+def test_asked_to_end_by_a_cluster_it_stores_all_it_has_and_leaves_no_process(tmp_path, backend):
     study, store = write_study(tmp_path, 33, 40), tmp_path / "study.sqlite"
-    process = start(study, "--jobs", "2")
+    process = start(study, "--jobs", "2", "--backend", backend)
     wait_for_results(process, store, 1)
     process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=120)
     assert process.returncode == 4, err
     assert "the same command goes on from there" in out and "Traceback" not in err
+    assert "SIGTERM" not in err
     assert gone(process)
     assert 0 < stored(store) < 2640
     assert sorted(p.name for p in tmp_path.iterdir()) == ["short.csv", "study.sqlite", "study.toml"]
