@@ -23,7 +23,7 @@ from hevopt.commands import (
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError, HevoptError, SolverError
-from hevopt.writing import files_told
+from hevopt.files.writing import files_told
 
 app = typer.Typer(
     name="hevopt",

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hevopt.errors import DataError
-from hevopt.imports.cycle_import import import_cycle
+from hevopt.measured.cycles.cycle import import_cycle
 
 # With a standstill, in km/h at whole seconds.
 DRIVE_KMH = [0, 0, 9, 18, 27, 36, 36, 27, 9, 0, 0, 0, 18, 36, 18, 0]

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hevopt import engine as engine_model
 from hevopt import load_architecture
-from hevopt.files import shipped_folder
+from hevopt.car import engine as engine_model
+from hevopt.files.lookup import shipped_folder
 
 SHIPPED = shipped_folder("architectures")
 RPM = pi / 30

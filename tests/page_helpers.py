@@ -8,10 +8,11 @@ from time import monotonic
 
 import pytest
 
-from hevopt import outputs, study
-from hevopt.pages.collect import Collector
-from hevopt.pages.comparison import comparison_page
-from hevopt.pages.results import Results
+from hevopt.output import file_tables as outputs
+from hevopt.pages.comparison.collect import Collector
+from hevopt.pages.comparison.page import comparison_page
+from hevopt.pages.comparison.results import Results
+from hevopt.studies import comparison as study
 
 FLAGS = [
     "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",

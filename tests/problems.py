@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from hevopt import Battery, Control, ControlTable, Problem
-from hevopt.problem import Signals
+from hevopt.problem.table import Signals
 
 
 def random_battery(rng: np.random.Generator, curved: bool) -> Battery:

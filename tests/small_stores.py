@@ -1,6 +1,6 @@
 """What tests fill a store with: two designs of two strategies, and outcomes of their cases."""
 
-from hevopt.sweeps.jobs import Outcome, Planned
+from hevopt.sweeps.plan.jobs import Outcome, Planned
 
 DESIGNS = [(0, {"a": 0.1, "nox_weight": 0}), (1, {"a": 0.2, "nox_weight": 0})]
 PLAN = [Planned(n, "nedc", s, 0.0, f"{n}{s}") for n in (1, 0) for s in ("ecms", "dp")]

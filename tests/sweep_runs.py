@@ -10,12 +10,12 @@ import sys
 import time
 from pathlib import Path
 
-from hevopt.sweeps.export import csv_of
-from hevopt.sweeps.lock import locked
-from hevopt.sweeps.reading import open_to_read
+from hevopt.sweeps.plan.study_file import read_study
 from hevopt.sweeps.run import Execution, Watch, begin, plan_of, run_sweep
-from hevopt.sweeps.store import open_store
-from hevopt.sweeps.study_file import read_study
+from hevopt.sweeps.store.export import csv_of
+from hevopt.sweeps.store.lock import locked
+from hevopt.sweeps.store.reading import open_to_read
+from hevopt.sweeps.store.store import open_store
 
 SPEEDS_MPS = [
     0, 0, 1.5, 3, 4.5, 6, 7.5, 9, 10, 11, 12, 12.5, 13, 13, 13, 13, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0,

@@ -7,7 +7,7 @@ import time
 from zlib import crc32
 
 from hevopt.errors import SolverError
-from hevopt.sweeps.jobs import Case, Job, Outcome
+from hevopt.sweeps.plan.jobs import Case, Job, Outcome
 
 
 def jobs(count, cases=2, does=None):

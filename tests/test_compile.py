@@ -13,10 +13,10 @@ from problems import random_problem
 
 from hevopt import simulate
 from hevopt._compile import compiled
-from hevopt.choices import choices_of
-from hevopt.lower_dp import lower_bound_kg
-from hevopt.prices import one_price_dual
-from hevopt.step_prices import costate_dual
+from hevopt.bounds.lower_dp import lower_bound_kg
+from hevopt.bounds.prices import one_price_dual
+from hevopt.bounds.step_prices import costate_dual
+from hevopt.problem.choices import choices_of
 from hevopt.strategies import _rollout_kernels, dp
 
 TWICE = """

@@ -65,7 +65,7 @@ def test_the_table_shown_is_the_table_printed(comparison_of):
 
 def test_the_page_of_strategies_is_made(monkeypatch, tmp_path, capsys):
     # One cycle here; the page in reports/ is made over all of them, in about a minute.
-    monkeypatch.setattr("hevopt.files.shipped_names", lambda kind, suffix: ["hwfet"])
+    monkeypatch.setattr("hevopt.files.lookup.shipped_names", lambda kind, suffix: ["hwfet"])
     page = tmp_path / "strategies.md"
     monkeypatch.setattr("sys.argv", ["hevopt", "strategies", "--out", str(page)])
     with pytest.raises(SystemExit) as stop:

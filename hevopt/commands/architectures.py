@@ -28,9 +28,9 @@ def new(
     ] = None,
 ) -> None:
     """Write a commented architecture to edit, with the same results as the one it is like."""
-    from hevopt.architecture_new import new_files
-    from hevopt.files import encodable
-    from hevopt.writing import check_writable, note_asked, write_whole
+    from hevopt.car_files.template import new_files
+    from hevopt.files.shown import encodable
+    from hevopt.files.writing import check_writable, note_asked, write_whole
 
     files = new_files(name, like, out, listed(components) or ())
     check_writable(list(files)[-1])
@@ -54,7 +54,7 @@ def schema(
     """Print the JSON Schema of architecture and component files."""
     import json
 
-    from hevopt import file_schema
+    from hevopt.car_files import schema as file_schema
 
     write(json.dumps(file_schema.schema(kind), indent=1, ensure_ascii=False))
 
@@ -69,8 +69,8 @@ def validate(
     ],
 ) -> None:
     """Check files in full: every fault of all of them at once, with key, value and allowed range."""
-    from hevopt.files import printable
-    from hevopt.validation import validate
+    from hevopt.checks.validate import validate
+    from hevopt.files.shown import printable
 
     findings = [validate(name) for name in files]
     seen: set[str] = set()

@@ -18,7 +18,7 @@ from hevopt.commands.components import (
 from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
-from hevopt.files import printable, shown
+from hevopt.files.shown import printable, shown
 
 
 def coastdown(
@@ -50,12 +50,12 @@ def coastdown(
     sheet: SheetOption = None,
 ) -> None:
     """C0, C1, C2 of the road load from coast-downs in both directions, with confidence intervals."""
-    from hevopt.imports.coastdown import fit_road_load
-    from hevopt.imports.coastdown_car import car_base, car_contents, check_mass, said_of_mass
-    from hevopt.imports.coastdown_report import results
-    from hevopt.imports.coastdown_runs import ROLES, ROLES_WITH_UNIT, read_runs
-    from hevopt.imports.component_text import component_text
-    from hevopt.writing import check_outs, write_whole
+    from hevopt.car_files.text import component_text
+    from hevopt.files.writing import check_outs, write_whole
+    from hevopt.measured.coastdown.car import car_base, car_contents, check_mass, said_of_mass
+    from hevopt.measured.coastdown.fit import fit_road_load
+    from hevopt.measured.coastdown.report import results
+    from hevopt.measured.coastdown.runs import ROLES, ROLES_WITH_UNIT, read_runs
 
     check_outs({"--out": out, "--plot": plot}, [*files, *own_file(like)])
     kind = None if plot is None else _picture_kind(plot)
@@ -92,7 +92,7 @@ def coastdown(
     else:
         write(f"no {'car ' * (plot is not None)}file written; --out FILE writes the car")
     if plot is not None:
-        from hevopt.imports.figures import coastdown_figure
+        from hevopt.measured.coastdown.plot import coastdown_figure
 
         write_whole(plot, coastdown_figure(runs, fit, kind))
         write(f"plot written to {plot}")

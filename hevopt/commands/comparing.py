@@ -1,6 +1,5 @@
 """What `hevopt compare` is told, the files it leaves behind, and what it prints."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -9,26 +8,17 @@ from typing import TYPE_CHECKING, Any
 from hevopt.commands.reporting import command_line, write_files
 from hevopt.commands.terminal import show, write
 from hevopt.errors import DataError, HevoptError
-from hevopt.files import without_folders
 
 if TYPE_CHECKING:
-    from hevopt.case import Case
-    from hevopt.cycle import Cycle
-    from hevopt.pages.collect import Collector
-    from hevopt.problem import Plan, Trajectory
-    from hevopt.rows import Row
-    from hevopt.study import Comparison
-    from hevopt.study_file import Cars, Settings
+    from hevopt.driving.cycle import Cycle
+    from hevopt.pages.comparison.collect import Collector
+    from hevopt.problem.problem import Plan, Trajectory
+    from hevopt.studies.case import Case
+    from hevopt.studies.comparison import Comparison
+    from hevopt.studies.rows import Row
+    from hevopt.studies.settings import Cars, Settings
 
 _SHARED = {"nox_weight": 0.0, "allow_shortfall": False, "free_gear": False, "refine": False}
-
-
-def changes_shown(changes: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Car -> what was changed in it, files without folders that are the user's."""
-    return {
-        car: {k: without_folders(v) if isinstance(v, str) else v for k, v in of.items()}
-        for car, of in changes.items()
-    }
 
 
 @dataclass(frozen=True)
@@ -42,7 +32,7 @@ class Job:
     @cached_property
     def inputs(self) -> dict[str, str]:
         """File as it was read -> its digest."""
-        from hevopt.provenance import files_digests
+        from hevopt.studies.provenance import files_digests
 
         own = [self.settings.file] if self.settings.file is not None else []
         return dict(files_digests(self.cars.cars, [self.trace], own))
@@ -50,7 +40,7 @@ class Job:
     @cached_property
     def about(self) -> dict[str, Any]:
         """What a result comes from: digests of the files read, versions, and the settings made."""
-        from hevopt.provenance import digests_shown, versions
+        from hevopt.studies.provenance import changes_shown, digests_shown, versions
 
         settings = self.settings
         return {
@@ -67,7 +57,7 @@ class Job:
     @cached_property
     def is_study(self) -> bool:
         """Whether published figures may stand beside the results: cars and cycle are the study's, as shipped."""
-        from hevopt.published import is_study
+        from hevopt.reproduction.published import is_study
 
         return is_study(self.cars.cars, self.trace)
 
@@ -106,8 +96,8 @@ class Files:
         """DataError, before anything is solved, where a file cannot be written, is an input, or is named twice, and
         for fronts of NOx where an engine has no data on it.
         """
-        from hevopt.outputs import check_table_file
-        from hevopt.writing import check_outs
+        from hevopt.files.writing import check_outs
+        from hevopt.output.file_tables import check_table_file
 
         tables = {"--out": self.out, "--out-steps": self.steps}
         check_outs({"--report": self.page, "--save": self.save, **tables}, job.inputs)
@@ -115,7 +105,7 @@ class Files:
             if path is not None:
                 check_table_file(path)
         if self.fronts:
-            from hevopt.case import require_nox
+            from hevopt.studies.case import require_nox
 
             for car in job.cars.cars:
                 require_nox(car, "--fronts")
@@ -125,7 +115,7 @@ class Files:
                     "--fronts and --sensitivity add to the page; name it with --report or --save"
                 )
             return
-        from hevopt.pages.collect import Collector, check_steps
+        from hevopt.pages.comparison.collect import Collector, check_steps
 
         check_steps(job.trace)
         self._collector = Collector()
@@ -135,13 +125,13 @@ class Files:
         if self._collector is not None:
             self._collector.observe(case, row, plan, trajectory)
         if self.steps is not None:
-            from hevopt.outputs import step_columns
+            from hevopt.output.file_tables import step_columns
 
             self._driven.append((row, step_columns(case, trajectory)))
 
     def write(self, job: Job, comparison: "Comparison") -> tuple[list[str], dict[str, HevoptError]]:
         """Write all of them; a line for each, and the fronts and sensitivities that failed."""
-        from hevopt import outputs
+        from hevopt.output import file_tables as outputs
 
         lines, failures = self._write_page(job, comparison)
         if self.out is not None:
@@ -174,7 +164,8 @@ class Files:
 
 def show_comparison(job: Job, comparison: "Comparison", *, json: bool) -> None:
     """Print the rows as a table with notes and published figures, or as JSON."""
-    from hevopt import outputs, report
+    from hevopt.output import file_tables as outputs
+    from hevopt.output import terminal_tables as report
 
     if json:
         write(outputs.result_json(comparison, job.about))

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from hevopt.errors import DataError
-from hevopt.files import is_path, shown
+from hevopt.files.lookup import is_path
+from hevopt.files.shown import shown
 
 ColumnOption = Annotated[
     list[str] | None,

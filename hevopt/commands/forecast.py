@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from hevopt.cycle import Cycle
+from hevopt.driving.cycle import Cycle
 from hevopt.errors import HevoptError
 
 _LONG_STEPS = 10_000

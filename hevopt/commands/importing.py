@@ -10,7 +10,7 @@ from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
-    from hevopt.imports.cycle_sampled import Imported
+    from hevopt.measured.cycles.sampled import Imported
 
 
 def import_cycle(
@@ -70,8 +70,8 @@ def import_cycle(
     out: Annotated[Path | None, typer.Option(help="Cycle file to write, NAME.csv.")] = None,
 ) -> None:
     """Read a drive in another tool's shape, check it, resample it to 1 Hz; write it with --out."""
-    from hevopt.imports import cycle_import
-    from hevopt.imports.cycle_standstill import standstill_limit
+    from hevopt.measured.cycles import cycle as cycle_import
+    from hevopt.measured.cycles.standstill import standstill_limit
 
     if out is not None:
         _check_out(out, file)
@@ -97,7 +97,7 @@ def import_cycle(
 
 
 def _write(imported: tuple["Imported", ...], out: Path | None, file: Path) -> None:
-    from hevopt.writing import check_outs, write_whole
+    from hevopt.files.writing import check_outs, write_whole
 
     if out is None:
         write("not written; add --out NAME.csv to write the cycle" + "s" * (len(imported) > 1))
@@ -112,7 +112,7 @@ def _write(imported: tuple["Imported", ...], out: Path | None, file: Path) -> No
 
 
 def _show(imported: "Imported") -> None:
-    from hevopt.imports.cycle_sampled import summary
+    from hevopt.measured.cycles.sampled import summary
 
     for text in imported.assumptions:
         write(f"read as: {text}")
@@ -128,7 +128,7 @@ def _show(imported: "Imported") -> None:
 
 
 def _check_out(out: Path, file: Path) -> None:
-    from hevopt.writing import check_outs
+    from hevopt.files.writing import check_outs
 
     if out.suffix.lower() != ".csv":
         raise DataError(f"--out {out}: a cycle file's name ends in .csv; give such a name")

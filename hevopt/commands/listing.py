@@ -19,8 +19,8 @@ def architectures(context: typer.Context) -> None:
     """The shipped architectures."""
     if context.invoked_subcommand:
         return
-    from hevopt.architecture import load_architecture
-    from hevopt.files import shipped_names
+    from hevopt.car_files.load import load_architecture
+    from hevopt.files.lookup import shipped_names
     from hevopt.strategies import fitting
 
     for name in shipped_names("architectures", ".toml"):
@@ -33,8 +33,8 @@ def cycles(context: typer.Context) -> None:
     """The shipped cycles, with duration, distance, top speed and whether they list gears."""
     if context.invoked_subcommand:
         return
-    from hevopt.cycle import load_cycle
-    from hevopt.files import shipped_names
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.files.lookup import shipped_names
 
     for name in shipped_names("cycles", ".csv"):
         trace = load_cycle(name)
@@ -54,10 +54,11 @@ def strategies(
     ] = None,
 ) -> None:
     """The strategies, and what each knows while it drives."""
-    from hevopt import report, study
-    from hevopt.files import shipped_names
+    from hevopt.files.lookup import shipped_names
+    from hevopt.files.writing import check_writable, write_whole
+    from hevopt.output.strategies_page import strategies_page
     from hevopt.strategies import STRATEGIES
-    from hevopt.writing import check_writable, write_whole
+    from hevopt.studies import comparison as study
 
     if out is None:
         for name, strategy in STRATEGIES.items():
@@ -74,5 +75,5 @@ def strategies(
             for cycle in shipped_names("cycles", ".csv")
         ]  # fmt: skip
     steps = {c.cycle: study.steps_of(c.cycle) for c in comparisons}
-    write_whole(out, report.strategies_page(comparisons, steps).encode())
+    write_whole(out, strategies_page(comparisons, steps).encode())
     write(f"written to {out}")

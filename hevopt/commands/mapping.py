@@ -18,10 +18,10 @@ from hevopt.commands.components import (
 from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
-from hevopt.files import printable
+from hevopt.files.shown import printable
 
 if TYPE_CHECKING:
-    from hevopt.imports.map_import import Request
+    from hevopt.measured.maps.request import Request
 
 # First line of every component that an import writes, by which the next import knows it.
 _HEAD = "Measured map, written by hevopt maps import."
@@ -77,12 +77,12 @@ def import_map(
     in MATLAB or Octave, there save('map.mat', 'fc_map_spd', 'fc_map_trq', 'fc_fuel_map', 'fc_max_trq', '-v7'), and
     import map.mat; a machine's file is its --full-load too.
     """
-    from hevopt.imports.component_text import component_text
-    from hevopt.imports.figures import map_figure
-    from hevopt.imports.map_engine import import_engine
-    from hevopt.imports.map_machine import import_machine
-    from hevopt.imports.map_report import coverage
-    from hevopt.writing import check_outs, write_whole
+    from hevopt.car_files.text import component_text
+    from hevopt.files.writing import check_outs, write_whole
+    from hevopt.measured.maps.engine import import_engine
+    from hevopt.measured.maps.machine import import_machine
+    from hevopt.measured.maps.plot import map_figure
+    from hevopt.measured.maps.report import coverage
 
     values = values_of(given)
     if displacement_cm3 is not None:
@@ -128,9 +128,9 @@ def _request(
     extra: dict[str, str | None],
     values: dict[str, Any],
 ) -> "Request":
-    from hevopt.imports.map_import import Request
-    from hevopt.imports.map_roles import ROLES
-    from hevopt.imports.map_tables import Source
+    from hevopt.measured.maps.request import Request
+    from hevopt.measured.maps.roles import ROLES
+    from hevopt.measured.maps.tables import Source
 
     columns, units = pairs("--column", column, ROLES), pairs("--unit", unit, ROLES)
     others = {}

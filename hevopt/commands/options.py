@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from hevopt.errors import DataError
-from hevopt.files import shown
+from hevopt.files.shown import shown
 
 CycleOption = Annotated[str | None, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
 NoxOption = Annotated[
@@ -98,7 +98,7 @@ def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _as_in_a_file(given: dict[str, Any]) -> dict[str, Any]:
-    from hevopt.study_file import assignments
+    from hevopt.studies.settings import assignments
 
     values = dict(given)
     if "set" in values:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hevopt.commands.terminal import write
-from hevopt.files import encodable, starts_with
+from hevopt.files.lookup import starts_with
+from hevopt.files.shown import encodable
 
 if TYPE_CHECKING:
-    from hevopt.pages.results import Results
+    from hevopt.pages.comparison.results import Results
 
 _SQLITE = b"SQLite format 3\0"
 
@@ -23,7 +24,7 @@ def report(
     out: Annotated[Path, typer.Option("--out", help="The HTML page to write.")],
 ) -> None:
     """Write the page of saved results: one HTML file that opens offline."""
-    from hevopt.writing import check_outs, write_whole
+    from hevopt.files.writing import check_outs, write_whole
 
     page, inputs = _page(file)
     check_outs({"--out": out}, [file, *inputs])
@@ -34,13 +35,13 @@ def report(
 def _page(file: Path) -> tuple[str, list[str]]:
     """The page of a saved comparison, or of a sweep where the file is an SQLite database; the files behind it."""
     if starts_with(file, _SQLITE):
-        from hevopt.pages.sweep import sweep_page
-        from hevopt.pages.sweep_data import load_sweep
+        from hevopt.pages.sweep.data import load_sweep
+        from hevopt.pages.sweep.page import sweep_page
 
         sweep = load_sweep(file)
         return sweep_page(sweep), list(sweep.inputs)
-    from hevopt.pages.comparison import comparison_page
-    from hevopt.pages.saved import load_results
+    from hevopt.pages.comparison.page import comparison_page
+    from hevopt.pages.comparison.saved import load_results
 
     results = load_results(file)
     return comparison_page(results), list(results.inputs)
@@ -48,8 +49,8 @@ def _page(file: Path) -> tuple[str, list[str]]:
 
 def write_files(results: "Results", page: Path | None, saved: Path | None) -> list[str]:
     """Write the page and the saved results, each where asked for; a line for each."""
-    from hevopt.pages.comparison import comparison_page
-    from hevopt.writing import write_whole
+    from hevopt.files.writing import write_whole
+    from hevopt.pages.comparison.page import comparison_page
 
     contents = []
     if page is not None:

@@ -65,11 +65,11 @@ def compare(
     ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
-    from hevopt import study
     from hevopt.commands.comparing import Files, Job, show_comparison
     from hevopt.commands.forecast import say_how_long
-    from hevopt.cycle import load_cycle
-    from hevopt.study_file import Settings, cars_of, read_study, settings_of
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.studies import comparison as study
+    from hevopt.studies.settings import Settings, cars_of, read_study, settings_of
 
     named = {
         "cycle": cycle,
@@ -127,14 +127,16 @@ def run(
     json: JsonOption = False,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
-    from hevopt import outputs, report, study
-    from hevopt.case import prepare
     from hevopt.commands.comparing import Job
     from hevopt.commands.forecast import say_how_long
-    from hevopt.cycle import load_cycle
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.files.writing import check_outs
+    from hevopt.output import file_tables as outputs
+    from hevopt.output import terminal_tables as report
     from hevopt.strategies import strategy_named
-    from hevopt.study_file import cars_of, settings_of
-    from hevopt.writing import check_outs
+    from hevopt.studies import comparison as study
+    from hevopt.studies.case import prepare
+    from hevopt.studies.settings import cars_of, settings_of
 
     strategy_named(strategy)
     study.check_horizon(horizon, [strategy])
@@ -191,13 +193,13 @@ def table(
     cycle: CycleOption = "nedc",
 ) -> None:
     """Write the control table of an architecture on a cycle, for other solvers."""
-    from hevopt import report
-    from hevopt.case import require_nox
     from hevopt.commands.comparing import Job
-    from hevopt.cycle import load_cycle
-    from hevopt.powertrain import build_problem
-    from hevopt.study_file import cars_of, settings_of
-    from hevopt.writing import check_outs
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.files.writing import check_outs
+    from hevopt.output.control_table import write_table
+    from hevopt.powertrain.powertrain import build_problem
+    from hevopt.studies.case import require_nox
+    from hevopt.studies.settings import cars_of, settings_of
 
     settings = settings_of(_OPTIONS, given)
     job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
@@ -212,7 +214,7 @@ def table(
         nox_weight=nox_weight,
         allow_shortfall=settings.get("allow_shortfall", False),
     )
-    report.write_table(out, problem)
+    write_table(out, problem)
     steps, controls = problem.table.fuel_kg.shape
     write(
         f"{steps} steps x {controls} controls written to {out}; its README entry names the arrays"

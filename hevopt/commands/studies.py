@@ -17,12 +17,12 @@ from hevopt.commands.terminal import Progress, listed, show, write
 from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
-    from hevopt.architecture import Architecture
-    from hevopt.cycle import Cycle
-    from hevopt.pages.results import Results
-    from hevopt.problem import Problem
-    from hevopt.sensitivity import Effect
-    from hevopt.study_file import Cars, Settings
+    from hevopt.car.architecture import Architecture
+    from hevopt.driving.cycle import Cycle
+    from hevopt.pages.comparison.results import Results
+    from hevopt.problem.problem import Problem
+    from hevopt.studies.sensitivity import Effect
+    from hevopt.studies.settings import Cars, Settings
 
 _OPTIONS = "the command line"
 
@@ -54,8 +54,8 @@ def pareto(
 ) -> None:
     """Fuel against NOx: plans over the weight on NOx, and the certified front that none can cross."""
     from hevopt.commands.studies_view import front_notes, front_table, write_front
-    from hevopt.cycle import load_cycle
-    from hevopt.study_file import cars_of, settings_of
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.studies.settings import cars_of, settings_of
 
     if "nox_weight" in given:
         raise DataError("--nox-weight: a front has many weights; give them as --weights 0,10,100")
@@ -101,8 +101,8 @@ def sensitivity(
 ) -> None:
     """How fuel and NOx move with mass, resistances, losses, auxiliaries, battery and NOx map."""
     from hevopt.commands.studies_view import SHORTFALL_NOTE, effects_notes, effects_table
-    from hevopt.cycle import load_cycle
-    from hevopt.study_file import cars_of, settings_of
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.studies.settings import cars_of, settings_of
 
     settings = settings_of(_OPTIONS, _with_refine(given, refine))
     cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
@@ -123,9 +123,9 @@ def reproduction(
     out: Annotated[Path, typer.Option("--out", help="The Markdown page to write.")],
 ) -> None:
     """The published study beside ours, with what each difference comes from."""
+    from hevopt.files.writing import check_writable, write_whole
     from hevopt.reproduction.cases import reproduce
     from hevopt.reproduction.page import page
-    from hevopt.writing import check_writable, write_whole
 
     check_writable(out)
     with Progress() as progress:
@@ -147,7 +147,7 @@ def with_studies(
 
     A car whose front or sensitivities cannot be had is a failure, and costs no other result.
     """
-    from hevopt.pages.results import ParetoFront, Sensitivity
+    from hevopt.pages.comparison.results import ParetoFront, Sensitivity
 
     wanted = [car for car in cars.cars if car.name in results.cars]
     added: dict[str, list] = {"pareto": [], "sensitivity": []}
@@ -182,10 +182,11 @@ def _front(
     points: int | None = None,
 ) -> tuple[dict[str, Any], int]:
     """The figures of a car's front, and the number of steps driven with less than the cycle asks."""
-    from hevopt.case import require_nox
-    from hevopt.pareto import GAP_ENOUGH, POINTS_MAX, figures_of, front
-    from hevopt.rows import shortfall_steps
+    from hevopt.output.front_figures import figures_of
     from hevopt.strategies import strategy_named
+    from hevopt.studies.case import require_nox
+    from hevopt.studies.pareto import GAP_ENOUGH, POINTS_MAX, front
+    from hevopt.studies.rows import shortfall_steps
 
     chosen = strategy_named(strategy)
     if chosen.learns:
@@ -205,8 +206,8 @@ def _front(
 
 def _problem(car: "Architecture", trace: "Cycle", settings: "Settings") -> "Problem":
     """What a front is drawn on: the very table of the comparison's rows, so that none can lie beyond it."""
-    from hevopt.case import prepare
-    from hevopt.powertrain import build_problem
+    from hevopt.powertrain.powertrain import build_problem
+    from hevopt.studies.case import prepare
 
     allow_shortfall = settings.get("allow_shortfall", False)
     if not settings.get("refine", False):
@@ -225,7 +226,7 @@ def _effects(
     progress: Progress,
     strategies: Sequence[str] | None = None,
 ) -> list["Effect"]:
-    from hevopt.sensitivity import sensitivities
+    from hevopt.studies.sensitivity import sensitivities
 
     free = {"gear": "free"} if car.gear == "free" else {}
     return sensitivities(
@@ -245,7 +246,7 @@ def _with_refine(given: dict[str, Any], refine: bool | None) -> dict[str, Any]:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    from hevopt.files import shown
+    from hevopt.files.shown import shown
 
     try:
         return [float(part) for part in text.split(",") if part.strip()]
@@ -256,8 +257,8 @@ def _numbers(option: str, text: str) -> list[float]:
 
 
 def _check_csv(out: Path, inputs: Iterable[Path]) -> None:
-    from hevopt.files import printable
-    from hevopt.writing import check_outs
+    from hevopt.files.shown import printable
+    from hevopt.files.writing import check_outs
 
     if out.suffix.lower() != ".csv":
         raise DataError(f"--out {printable(str(out))}: choose a name that ends in .csv")
@@ -265,8 +266,7 @@ def _check_csv(out: Path, inputs: Iterable[Path]) -> None:
 
 
 def _about(cars: "Cars", trace: "Cycle") -> dict[str, Any]:
-    from hevopt.commands.comparing import changes_shown
-    from hevopt.provenance import digests_shown, files_digests, versions
+    from hevopt.studies.provenance import changes_shown, digests_shown, files_digests, versions
 
     return {
         "inputs": digests_shown(files_digests(cars.cars, [trace])),

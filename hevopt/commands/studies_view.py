@@ -10,10 +10,10 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.architecture import Architecture
-from hevopt.cycle import Cycle
-from hevopt.sensitivity import Effect, unsolved
-from hevopt.writing import csv_cells, write_whole
+from hevopt.car.architecture import Architecture
+from hevopt.driving.cycle import Cycle
+from hevopt.files.writing import csv_cells, write_whole
+from hevopt.studies.sensitivity import Effect, unsolved
 
 _EFFECTS_NOTES = """fuel: charge-corrected, change against the car as given. elasticity: per cent of fuel (NOx) per
 per cent of the parameter. Everything is solved afresh for each value, thresholds of rules calibrated anew. NOx is

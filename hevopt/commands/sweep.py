@@ -10,8 +10,8 @@ from hevopt.commands.sweep_end import end, export_store, show_status
 from hevopt.commands.sweep_view import SweepProgress, duration
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
-from hevopt.files import printable
-from hevopt.writing import note_written
+from hevopt.files.shown import printable
+from hevopt.files.writing import note_written
 
 if TYPE_CHECKING:
     from hevopt.sweeps.run import Execution, Plan, Progress
@@ -150,9 +150,9 @@ def _check(
     execution: "Execution", study: Path, store: Path, export: Path | None, resume: bool
 ) -> None:
     """DataError, before anything is planned, where something could not be had at the end."""
-    from hevopt.sweeps.export import check_export
-    from hevopt.sweeps.pools import check_backend
-    from hevopt.writing import check_outs
+    from hevopt.files.writing import check_outs
+    from hevopt.sweeps.store.export import check_export
+    from hevopt.sweeps.workers.pools import check_backend
 
     check_backend(execution.backend, execution.scheduler)
     check_outs({"--store": store, "--export": export}, [study])
@@ -176,12 +176,12 @@ def _run(
     wish: "Wish",
 ) -> "Progress":
     """How it went. Raises Stopped."""
-    from hevopt.sweeps.lock import locked
-    from hevopt.sweeps.reading import open_to_read
+    from hevopt.files.writing import check_outs
+    from hevopt.sweeps.plan.study_file import read_study
     from hevopt.sweeps.run import Watch, begin, plan_of, run_sweep
-    from hevopt.sweeps.store import open_store
-    from hevopt.sweeps.study_file import read_study
-    from hevopt.writing import check_outs
+    from hevopt.sweeps.store.lock import locked
+    from hevopt.sweeps.store.reading import open_to_read
+    from hevopt.sweeps.store.store import open_store
 
     contents = read_study(study)
     with locked(store):
@@ -216,12 +216,12 @@ def _rehearse(
     progress: SweepProgress,
     wish: "Wish",
 ) -> None:
-    from hevopt.sweeps.designs import merged_values
     from hevopt.sweeps.estimate import timed_sample
-    from hevopt.sweeps.pools import cores
-    from hevopt.sweeps.reading import open_to_read
+    from hevopt.sweeps.plan.designs import merged_values
+    from hevopt.sweeps.plan.study_file import read_study
     from hevopt.sweeps.run import Watch, plan_of, settled
-    from hevopt.sweeps.study_file import read_study
+    from hevopt.sweeps.store.reading import open_to_read
+    from hevopt.sweeps.workers.pools import cores
 
     contents = read_study(study)
     plan = plan_of(contents, prune=prune, progress=progress.plan)

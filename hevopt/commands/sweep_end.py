@@ -9,19 +9,19 @@ import typer
 from hevopt.commands.sweep_view import best_table, counted, discarded, duration, reasons
 from hevopt.commands.terminal import show, write
 from hevopt.errors import InfeasibleError
-from hevopt.files import printable
+from hevopt.files.shown import printable
 
 if TYPE_CHECKING:
-    from hevopt.sweeps.reading import Reader
     from hevopt.sweeps.run import Progress
+    from hevopt.sweeps.store.reading import Reader
 
 PARTLY = 4
 
 
 def end(store: Path, done: "Progress | None", export: Path | None) -> None:
     """Say what came of it; the exit status says it too."""
-    from hevopt.sweeps.export import export as write_export
-    from hevopt.sweeps.reading import open_to_read
+    from hevopt.sweeps.store.export import export as write_export
+    from hevopt.sweeps.store.reading import open_to_read
 
     if done is None and not store.exists():
         write("stopped before anything was run; the same command starts it")
@@ -72,7 +72,7 @@ def _say_standing(reader: "Reader") -> None:
 
 def show_status(path: Path) -> None:
     """Print how far the sweep of a store is, and its best designs so far."""
-    from hevopt.sweeps.reading import open_to_read
+    from hevopt.sweeps.store.reading import open_to_read
 
     with open_to_read(path) as reader:
         meta, counts = reader.meta(), reader.counts()
@@ -84,9 +84,9 @@ def show_status(path: Path) -> None:
 
 def export_store(store: Path, out: Path) -> None:
     """Write the cases of a store as a table."""
-    from hevopt.sweeps.export import check_export, export
-    from hevopt.sweeps.reading import inputs_in, open_to_read
-    from hevopt.writing import check_outs
+    from hevopt.files.writing import check_outs
+    from hevopt.sweeps.store.export import check_export, export
+    from hevopt.sweeps.store.reading import inputs_in, open_to_read
 
     check_outs({"--export": out}, [store])
     check_export(out)

@@ -6,15 +6,15 @@ from math import isfinite
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from hevopt.files import printable, shown
+from hevopt.files.shown import printable, shown
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from hevopt.sweeps.ranking import Ranked
-    from hevopt.sweeps.reading import Reader
-    from hevopt.sweeps.reasons import Reason
     from hevopt.sweeps.run import Progress
+    from hevopt.sweeps.store.ranking import Ranked
+    from hevopt.sweeps.store.reading import Reader
+    from hevopt.sweeps.store.reasons import Reason
 
 _LINE_EVERY_S = 10.0
 _BEST, _LINES = 5, 20
@@ -110,7 +110,7 @@ def counted(counts: dict[str, int]) -> str:
 
 def reasons(reader: "Reader") -> list[str]:
     """The most frequent errors of failed and infeasible cases, each with its number and the first design it hit."""
-    from hevopt.sweeps.reasons import Reasons
+    from hevopt.sweeps.store.reasons import Reasons
 
     found = Reasons()
     for record in reader.records():
@@ -151,7 +151,7 @@ def best_table(reader: "Reader") -> "tuple[Table | None, int]":
     from rich.table import Table
     from rich.text import Text
 
-    from hevopt.sweeps.ranking import best_designs
+    from hevopt.sweeps.store.ranking import best_designs
 
     best = best_designs(reader, _BEST)
     each = _BEST if _BEST * len(best) <= _LINES else 1

@@ -7,26 +7,20 @@ is charge-corrected: less what the end charge is worth by the multiplier of the 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from hevopt.architecture import Architecture, load_architecture
-from hevopt.certificate import certify
-from hevopt.cycle import Cycle, load_cycle
-from hevopt.demand import demand_of
-from hevopt.published import CARS, CYCLE, HYBRIDS, Cases, cases_of
+from hevopt.bounds.certificate import certify
+from hevopt.car.architecture import Architecture
+from hevopt.car_files.load import load_architecture
+from hevopt.driving.cycle import Cycle, load_cycle
+from hevopt.driving.demand import demand_of
+from hevopt.problem.simulation import simulate
 from hevopt.reproduction import variations as v
 from hevopt.reproduction.energies import Balance, balance
-from hevopt.reproduction.members import (
-    Member,
-    calibrated,
-    curve,
-    family,
-    in_units,
-    surplus_percent,
-)
+from hevopt.reproduction.members import Member, calibrated, curve, family, in_units, surplus_percent
+from hevopt.reproduction.published import CARS, CYCLE, HYBRIDS, Cases, cases_of
 from hevopt.reproduction.variations import Variation, varied
-from hevopt.rows import NEUTRAL_PERCENT
-from hevopt.simulation import simulate
 from hevopt.strategies import strategy_named
-from hevopt.study import Comparison, compare
+from hevopt.studies.comparison import Comparison, compare
+from hevopt.studies.rows import NEUTRAL_PERCENT
 
 _RULES = {"A": ("baseline",), "B": ("start_stop",)}
 _HYBRID_RULES = ("conventional", "nox_cut")

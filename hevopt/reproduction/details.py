@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-from hevopt.published import HYBRIDS, STATEMENTS, Statement
 from hevopt.reproduction.cases import CUTS_PERCENT, Reproduction
 from hevopt.reproduction.energies import Balance
 from hevopt.reproduction.members import Member, least_penalty
+from hevopt.reproduction.published import HYBRIDS, STATEMENTS, Statement
 from hevopt.reproduction.verdicts import markdown, signed
 
 # Points of fuel within which members of a curve count as equals.

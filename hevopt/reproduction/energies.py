@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.certificate import certify
+from hevopt.bounds.certificate import certify
+from hevopt.problem.simulation import simulate
 from hevopt.reproduction.variations import Varied
-from hevopt.simulation import simulate
 from hevopt.strategies import strategy_named
 from hevopt.units import litres_per_100km
 

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hevopt.architecture import Architecture
-from hevopt.cycle import Cycle
-from hevopt.problem import Plan
-from hevopt.published import Figures, percent
+from hevopt.car.architecture import Architecture
+from hevopt.driving.cycle import Cycle
+from hevopt.problem.problem import Plan
+from hevopt.reproduction.published import Figures, percent
 from hevopt.reproduction.variations import Varied
-from hevopt.rows import NEUTRAL_PERCENT
 from hevopt.strategies import conventional, strategy_named
+from hevopt.studies.rows import NEUTRAL_PERCENT
 from hevopt.units import litres_per_100km
 
 CURVE_KW = tuple(range(15))

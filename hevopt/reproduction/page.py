@@ -2,7 +2,12 @@
 
 from collections.abc import Sequence
 
-from hevopt.published import (
+from hevopt.reproduction import sections
+from hevopt.reproduction import variations as v
+from hevopt.reproduction.cases import JOINT_ELECTRIC, K_AND_STEEP, Reproduction
+from hevopt.reproduction.details import members_of
+from hevopt.reproduction.members import least_penalty
+from hevopt.reproduction.published import (
     CYCLE,
     HYBRIDS,
     MEAN_NOX,
@@ -12,11 +17,6 @@ from hevopt.published import (
     Statement,
     percent,
 )
-from hevopt.reproduction import sections
-from hevopt.reproduction import variations as v
-from hevopt.reproduction.cases import JOINT_ELECTRIC, K_AND_STEEP, Reproduction
-from hevopt.reproduction.details import members_of
-from hevopt.reproduction.members import least_penalty
 from hevopt.reproduction.verdicts import (
     driven,
     markdown,
@@ -27,8 +27,8 @@ from hevopt.reproduction.verdicts import (
     star,
     starred,
 )
-from hevopt.rows import NEUTRAL_PERCENT
-from hevopt.study import Comparison
+from hevopt.studies.comparison import Comparison
+from hevopt.studies.rows import NEUTRAL_PERCENT
 
 COMMAND = "hevopt reproduction --out reports/reproduction.md"
 

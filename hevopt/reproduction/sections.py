@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from hevopt.architecture import load_architecture
-from hevopt.published import MEAN_NOX_WITHOUT_C1, STATEMENTS, Statement
+from hevopt.car_files.load import load_architecture
 from hevopt.reproduction import variations as v
 from hevopt.reproduction.cases import K_AND_STEEP, LOSSES, VARIATIONS_OF_B, Reproduction, Under
 from hevopt.reproduction.details import balances, curves, nox_spread, trade_off
+from hevopt.reproduction.published import MEAN_NOX_WITHOUT_C1, STATEMENTS, Statement
 from hevopt.reproduction.verdicts import applies, markdown, signed, star, starred, verdict
 
 TITLES = (

@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.architecture import Architecture, load_architecture
-from hevopt.cycle import Cycle
-from hevopt.powertrain import build_problem
-from hevopt.problem import Problem, Reject
+from hevopt.car.architecture import Architecture
+from hevopt.car_files.load import load_architecture
+from hevopt.driving.cycle import Cycle
+from hevopt.powertrain.powertrain import build_problem
+from hevopt.problem.problem import Problem
+from hevopt.problem.table import Reject
 from hevopt.units import KMH_PER_MPS
 
 LOSS_FACTOR, LESS_LOSS_FACTOR, RESISTANCE_FACTOR, HYBRID_MASS_FACTOR = 1.5, 0.5, 2.0, 2.0

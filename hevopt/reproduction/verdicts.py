@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from hevopt.published import STATEMENTS, Statement
 from hevopt.reproduction.cases import Reproduction, Under
 from hevopt.reproduction.members import Member
+from hevopt.reproduction.published import STATEMENTS, Statement
 
 # In place of NOx as driven.
 _NOT_CORRECTED = "not corrected"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from hevopt.errors import unknown_name
-from hevopt.problem import Plan
+from hevopt.problem.problem import Plan
 from hevopt.strategies import (
     a_ecms,
     baseline,

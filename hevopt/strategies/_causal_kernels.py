@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hevopt._battery_kernels import chemical_power, state_at
 from hevopt._compile import compiled
+from hevopt.problem._battery_kernels import chemical_power, state_at
 
 # Halvings of the bracket in which a factor over past steps is searched.
 _HALVINGS = 14

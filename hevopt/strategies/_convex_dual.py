@@ -13,8 +13,8 @@ solver's multipliers and are evaluated afresh: however inexact the solver, what 
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.battery import source_power_w
-from hevopt.problem import Problem
+from hevopt.problem.battery import source_power_w
+from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_parts import Cell, Hulls
 
 Array = NDArray[np.float64]

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.battery import source_power_w
 from hevopt.errors import InfeasibleError, SolverError
-from hevopt.problem import Problem
+from hevopt.problem.battery import source_power_w
+from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_dual import dual_value_kg
 from hevopt.strategies._convex_parts import Cell, Hulls, cell_of
 

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.battery import best_voltage_and_resistance, energy_j
-from hevopt.choices import Choices, without_dominated
-from hevopt.problem import Problem
+from hevopt.problem.battery import best_voltage_and_resistance, energy_j
+from hevopt.problem.choices import Choices, without_dominated
+from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_kernels import lower_hulls
 
 Array = NDArray[np.float64]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hevopt._battery_kernels import chemical_power, state_at
 from hevopt._compile import compiled
-from hevopt._prices_kernels import shortest_path
+from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.problem._battery_kernels import chemical_power, state_at
 
 
 @compiled()

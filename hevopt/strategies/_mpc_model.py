@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import Choices, choices_of, require_choices
-from hevopt.prices import drain_at_j
-from hevopt.problem import Problem, Signals
+from hevopt.bounds.prices import drain_at_j
+from hevopt.problem.choices import Choices, choices_of, require_choices
+from hevopt.problem.problem import Problem
+from hevopt.problem.table import Signals
 from hevopt.strategies import _mpc_kernels as kernels
 
 Array = NDArray[np.float64]

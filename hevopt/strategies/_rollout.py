@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt import battery as battery_model
-from hevopt.choices import Choices
 from hevopt.errors import InfeasibleError, SolverError
-from hevopt.problem import Problem
+from hevopt.problem import battery as battery_model
+from hevopt.problem.choices import Choices
+from hevopt.problem.problem import Problem
 from hevopt.strategies import _rollout_kernels as kernels
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt._battery_kernels import chemical_power, chemical_power_at, state_at
 from hevopt._compile import compiled
+from hevopt.problem._battery_kernels import chemical_power, chemical_power_at, state_at
 
 # Divisions of the grid between which a move over curved battery characteristics is taken as linear.
 _PIECES = 24

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hevopt._battery_kernels import chemical_power_at
 from hevopt._compile import compiled
+from hevopt.problem._battery_kernels import chemical_power_at
 
 
 @compiled()

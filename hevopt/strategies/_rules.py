@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import Choices, choices_of, require_choices
+from hevopt.bounds.prices import one_price_dual
 from hevopt.errors import DataError, InfeasibleError
-from hevopt.prices import one_price_dual
-from hevopt.problem import Plan, Problem
-from hevopt.simulation import total_cost_kg
+from hevopt.problem.choices import Choices, choices_of, require_choices
+from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies import _rule_kernels as kernels
 
 Array = NDArray[np.float64]

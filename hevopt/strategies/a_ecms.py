@@ -31,10 +31,10 @@ the mean gap is 1.8 %, more than without, so it is off by default.
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import choices_of, require_choices, require_path
+from hevopt.bounds.prices import drain_at_j
 from hevopt.errors import DataError
-from hevopt.prices import drain_at_j
-from hevopt.problem import Plan, Problem
+from hevopt.problem.choices import choices_of, require_choices, require_path
+from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _causal_kernels as kernels
 
 Array = NDArray[np.float64]

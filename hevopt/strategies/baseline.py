@@ -3,7 +3,7 @@
 import numpy as np
 
 from hevopt.errors import InfeasibleError
-from hevopt.problem import Plan, Problem
+from hevopt.problem.problem import Plan, Problem
 
 
 def solve(problem: Problem) -> Plan:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hevopt.problem import Plan, Problem
+from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
 
 _THRESHOLDS = 24

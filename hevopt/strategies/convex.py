@@ -21,12 +21,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt._prices_kernels import shortest_path
-from hevopt.choices import Choices, choices_of
+from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds.prices import drain_at_j, dual, one_price_dual, step_maxima
 from hevopt.errors import InfeasibleError
-from hevopt.prices import drain_at_j, dual, one_price_dual, step_maxima
-from hevopt.problem import Plan, Problem
-from hevopt.simulation import total_cost_kg
+from hevopt.problem.choices import Choices, choices_of
+from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies._convex_model import SOLVER, Solution, optimum
 from hevopt.strategies._convex_parts import hulls_of
 from hevopt.strategies._rollout import Reach, reach_of, roll

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.choices import Choices, choices_of, without_dominated
+from hevopt.bounds.prices import one_price_dual, typical_price_kgpj
 from hevopt.errors import DataError
-from hevopt.prices import one_price_dual, typical_price_kgpj
-from hevopt.problem import Plan, Problem
-from hevopt.simulation import total_cost_kg
+from hevopt.problem.choices import Choices, choices_of, without_dominated
+from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies import _rollout_kernels as kernels
 from hevopt.strategies._rollout import Reach, follow, reach_of
 from hevopt.strategies._value_blocks import ValueBlocks

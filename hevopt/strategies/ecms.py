@@ -13,11 +13,11 @@ ends with at least the asked charge is taken.
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt._prices_kernels import shortest_path
-from hevopt.choices import choices_of
-from hevopt.prices import drain_at_j, one_price_dual, typical_price_kgpj
-from hevopt.problem import Plan, Problem
-from hevopt.simulation import total_cost_kg
+from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds.prices import drain_at_j, one_price_dual, typical_price_kgpj
+from hevopt.problem.choices import choices_of
+from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies._rollout import reach_of, roll
 
 Array = NDArray[np.float64]

@@ -22,9 +22,9 @@ Neutrality comes from the feedback alone: the end charge is near the asked one, 
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt._battery_kernels import chemical_power_at
 from hevopt.errors import DataError, InfeasibleError
-from hevopt.problem import Plan, Problem
+from hevopt.problem._battery_kernels import chemical_power_at
+from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _mpc_kernels as kernels
 from hevopt.strategies._mpc_model import Model, model_of
 from hevopt.strategies._mpc_qp import HorizonSolver, PreviewQp

@@ -7,7 +7,7 @@ calibrated: of the whole family, the member of least NOx.
 
 import numpy as np
 
-from hevopt.problem import Plan, Problem
+from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
 
 _CAPS = 10

@@ -26,17 +26,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt import battery as battery_model
-from hevopt.choices import (
+from hevopt.bounds.prices import one_price_dual
+from hevopt.errors import DataError
+from hevopt.problem import battery as battery_model
+from hevopt.problem.choices import (
     Choices,
     choices_of,
     require_choices,
     require_path,
     without_dominated,
 )
-from hevopt.errors import DataError
-from hevopt.prices import one_price_dual
-from hevopt.problem import Plan, Problem, Signals
+from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
 
 Array = NDArray[np.float64]

@@ -3,7 +3,7 @@
 What the electric load took meanwhile is charged back while driving; see _rules.py for the charging power.
 """
 
-from hevopt.problem import Plan, Problem
+from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
 
 _NEVER_ELECTRIC_W = -1.0

@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 from time import monotonic
 
-from hevopt.sweeps.backends import workers
-from hevopt.sweeps.jobs import Job
+from hevopt.sweeps.plan.jobs import Job
 from hevopt.sweeps.run import Execution, Plan, Stopped, Watch
+from hevopt.sweeps.workers.backends import workers
 
 _SAMPLES, _SAMPLE_WEIGHTS = 4, 3
 

@@ -7,19 +7,19 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from time import monotonic
 
-from hevopt.cycle import load_cycle
+from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError
-from hevopt.files import dumped_json
-from hevopt.provenance import code_digest, digest, files_digests, versions
-from hevopt.sweeps.backends import Run, workers
-from hevopt.sweeps.child import Terms
-from hevopt.sweeps.designs import Designs, cars_of, designs_of, groups_of
-from hevopt.sweeps.jobs import BOUND, Job, Planned, jobs_of
-from hevopt.sweeps.prune import Bounded, follows, mean_bound, mean_objective, search
-from hevopt.sweeps.store import Store
-from hevopt.sweeps.study_file import SweepStudy
+from hevopt.files.lookup import dumped_json
+from hevopt.studies.provenance import code_digest, digest, files_digests, versions
+from hevopt.sweeps.plan.designs import Designs, cars_of, designs_of, groups_of
+from hevopt.sweeps.plan.jobs import BOUND, Job, Planned, jobs_of
+from hevopt.sweeps.plan.prune import Bounded, follows, mean_bound, mean_objective, search
+from hevopt.sweeps.plan.study_file import SweepStudy
+from hevopt.sweeps.store.store import Store
+from hevopt.sweeps.workers.backends import Run, workers
+from hevopt.sweeps.workers.child import Terms
 
-WORK = "hevopt.sweeps.work:run_job"
+WORK = "hevopt.sweeps.workers.work:run_job"
 
 
 @dataclass(frozen=True, slots=True)

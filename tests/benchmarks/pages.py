@@ -19,10 +19,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from page_helpers import FLAGS, Made, Opened, find_browser, forty_rows
 
-from hevopt.pages import page
-from hevopt.pages.comparison import comparison_page
-from hevopt.pages.results import Results
-from hevopt.provenance import versions
+from hevopt.pages import render as page
+from hevopt.pages.comparison.page import comparison_page
+from hevopt.pages.comparison.results import Results
+from hevopt.studies.provenance import versions
 
 OUT = Path(__file__).parents[2] / "reports" / "benchmarks_pages.md"
 RUNS = 5

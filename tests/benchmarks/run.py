@@ -29,12 +29,12 @@ from hevopt import (
     simulate,
     solve,
 )
-from hevopt.choices import choices_of, without_dominated
-from hevopt.demand import demand_of
-from hevopt.lower_dp import lower_bound_kg
-from hevopt.powertrain import build_table
-from hevopt.prices import one_price_dual
-from hevopt.step_prices import costate_dual, lp_dual
+from hevopt.bounds.lower_dp import lower_bound_kg
+from hevopt.bounds.prices import one_price_dual
+from hevopt.bounds.step_prices import costate_dual, lp_dual
+from hevopt.driving.demand import demand_of
+from hevopt.powertrain.powertrain import build_table
+from hevopt.problem.choices import choices_of, without_dominated
 from hevopt.strategies import _rollout_kernels as kernels
 from hevopt.strategies import dp, ecms
 

@@ -15,8 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from hevopt.provenance import versions
-from hevopt.sweeps.reading import open_to_read
+from hevopt.studies.provenance import versions
+from hevopt.sweeps.store.reading import open_to_read
 
 OUT = Path(__file__).parents[2] / "reports" / "benchmarks_sweeps.md"
 DESIGNS = """architecture = "C2"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from hevopt.sweeps.store import SCHEMA
+from hevopt.sweeps.store.store import SCHEMA
 
 _COLUMNS = {
     "meta": ("name", "value"), "designs": ("number", "parameters"),

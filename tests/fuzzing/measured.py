@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from fuzzing.seed import Seed, each_spoilt
 
-_WORKBOOKS = Path(__file__).parents[1] / "imports" / "workbooks"
+_WORKBOOKS = Path(__file__).parents[1] / "measured" / "workbooks"
 
 
 def measured() -> list[Seed]:

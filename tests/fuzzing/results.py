@@ -33,7 +33,7 @@ def results() -> list[Seed]:
 
 def _saved() -> bytes:
     from hevopt import compare
-    from hevopt.pages.collect import Collector
+    from hevopt.pages.comparison.collect import Collector
 
     collector = Collector()
     comparison = compare(
@@ -43,12 +43,12 @@ def _saved() -> bytes:
 
 
 def _store() -> bytes:
-    from hevopt.sweeps.jobs import Outcome
-    from hevopt.sweeps.prune import Pruned
+    from hevopt.sweeps.plan.jobs import Outcome
+    from hevopt.sweeps.plan.prune import Pruned
+    from hevopt.sweeps.plan.study_file import read_study
     from hevopt.sweeps.run import begin, plan_of
-    from hevopt.sweeps.store import open_store
-    from hevopt.sweeps.study_file import read_study
-    from hevopt.sweeps.work import run_job
+    from hevopt.sweeps.store.store import open_store
+    from hevopt.sweeps.workers.work import run_job
 
     with tempfile.TemporaryDirectory(prefix="hevopt-fuzz-") as name:
         study, path = Path(name) / "sweep.toml", Path(name) / "sweep.sqlite"

@@ -9,8 +9,8 @@ import pytest
 from problems import every_plan, random_problem
 
 from hevopt import Battery, ControlTable, InfeasibleError, Problem, SolverError, certify, simulate
-from hevopt.choices import choices_of
-from hevopt.prices import one_price_dual
+from hevopt.bounds.prices import one_price_dual
+from hevopt.problem.choices import choices_of
 from hevopt.strategies import convex, dp
 from hevopt.strategies._convex_dual import dual_value_kg
 from hevopt.strategies._convex_model import optimum

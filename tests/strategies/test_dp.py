@@ -8,17 +8,9 @@ import numpy as np
 import pytest
 from problems import random_problem
 
-from hevopt import (
-    Battery,
-    Control,
-    ControlTable,
-    InfeasibleError,
-    Problem,
-    certify,
-    simulate,
-)
-from hevopt._battery_kernels import chemical_power_at
-from hevopt.choices import choices_of
+from hevopt import Battery, Control, ControlTable, InfeasibleError, Problem, certify, simulate
+from hevopt.problem._battery_kernels import chemical_power_at
+from hevopt.problem.choices import choices_of
 from hevopt.strategies import _rollout_kernels as kernels
 from hevopt.strategies import dp, ecms
 

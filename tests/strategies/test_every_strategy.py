@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import hevopt
 from hevopt import HevoptError, build_problem, load_architecture, load_cycle, simulate
-from hevopt.cycle import Cycle
-from hevopt.files import shipped_names
+from hevopt.driving.cycle import Cycle
+from hevopt.files.lookup import shipped_names
 from hevopt.strategies import STRATEGIES, ecms, fitting
 
 # Calls of hevopt's functions: many times what the dearest of these drives takes.

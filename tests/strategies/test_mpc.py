@@ -8,9 +8,9 @@ import pytest
 from problems import random_problem
 
 from hevopt import DataError, Problem, SolverError, simulate
-from hevopt.certificate import certify
+from hevopt.bounds.certificate import certify
 from hevopt.errors import InfeasibleError
-from hevopt.problem import ControlTable
+from hevopt.problem.table import ControlTable
 from hevopt.strategies import _mpc_kernels as kernels
 from hevopt.strategies import _mpc_qp, mpc
 from hevopt.strategies._mpc_model import model_of

@@ -8,7 +8,8 @@ from conftest import CYCLES
 from problems import rows
 
 from hevopt import DataError, certify, simulate
-from hevopt.problem import Plan, Signals
+from hevopt.problem.problem import Plan
+from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import dp, sdp
 
@@ -128,7 +129,7 @@ def test_kernels_agree_with_a_plain_twin(problem_of):
 
 def plain_value(problem, chain, joined, ahead, z):
     """One Bellman step of a class, choice by choice, for energies that stay within the window."""
-    from hevopt._battery_kernels import chemical_power_at
+    from hevopt.problem._battery_kernels import chemical_power_at
 
     low, high = problem.window_j
     modes, nodes = ahead.shape[1:]

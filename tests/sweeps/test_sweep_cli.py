@@ -27,8 +27,8 @@ from sweep_runs import (
 )
 
 from hevopt.commands import sweep_view
-from hevopt.sweeps.lock import locked
 from hevopt.sweeps.run import Progress, Stopped
+from hevopt.sweeps.store.lock import locked
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def test_the_columns_of_parquet_have_the_same_types_whatever_is_in_the_store(
     swept, monkeypatch, capsys, tmp_path
 ):
     study = write_study(tmp_path, 3, 2, ("bound",))
-    sweep_here(study, tmp_path / "bounds.sqlite", "hevopt.sweeps.work:run_job", workers=1)
+    sweep_here(study, tmp_path / "bounds.sqlite", "hevopt.sweeps.workers.work:run_job", workers=1)
     schemas = []
     for store in (swept[1], tmp_path / "bounds.sqlite"):
         out = tmp_path / "cases.parquet"
@@ -235,7 +235,7 @@ def test_a_second_sweep_on_a_store_is_refused(swept, monkeypatch, capsys):
 
 
 def test_a_cluster_that_does_not_answer_is_told(swept, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr("hevopt.sweeps.pools._CONNECT_S", 0.5)
+    monkeypatch.setattr("hevopt.sweeps.workers.pools._CONNECT_S", 0.5)
     words = [
         "--backend",
         "dask",
@@ -296,7 +296,9 @@ def test_the_first_signal_ends_a_sweep_whose_scheduler_says_nothing(tmp_path):
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         process = start(study, "--backend", "dask", "--scheduler", address)
         deadline = time.monotonic() + 120
-        while not any("hevopt.sweeps.probe" in command for command in session(process).values()):
+        while not any(
+            "hevopt.sweeps.workers.probe" in command for command in session(process).values()
+        ):
             assert time.monotonic() < deadline and process.poll() is None
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)

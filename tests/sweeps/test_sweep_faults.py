@@ -29,7 +29,7 @@ from sweep_runs import (
 )
 
 from hevopt.errors import DataError
-from hevopt.sweeps.reading import open_to_read
+from hevopt.sweeps.store.reading import open_to_read
 
 ROUNDS = [pytest.param(1, id="once"), pytest.param(20, id="20 times", marks=pytest.mark.long)]
 BACKENDS = [
@@ -98,7 +98,13 @@ def test_workers_whose_parent_is_killed_before_their_first_task_end_too(study, t
 
 def workers_of(process):
     """Workers of a started sweep and their processes; not its services, such as a scheduler."""
-    marks = ("loky.backend.popen", "hevopt.sweeps.child", "spawn_main", "ray::_called", "ray::IDLE")
+    marks = (
+        "loky.backend.popen",
+        "hevopt.sweeps.workers.child",
+        "spawn_main",
+        "ray::_called",
+        "ray::IDLE",
+    )
     return [
         pid for pid, command in session(process).items()
         if pid != process.pid and any(mark in command for mark in marks)

@@ -16,14 +16,14 @@ from sweep_runs import check_sound, stored, sweep_here, table, write_study
 import hevopt
 from hevopt.errors import DataError
 from hevopt.sweeps.estimate import timed_sample
-from hevopt.sweeps.prune import WAVES
-from hevopt.sweeps.ranking import best_designs
-from hevopt.sweeps.reading import open_to_read
+from hevopt.sweeps.plan.prune import WAVES
+from hevopt.sweeps.plan.study_file import read_study
 from hevopt.sweeps.run import Execution, Stopped, Watch, plan_of
-from hevopt.sweeps.study_file import read_study
-from hevopt.sweeps.work import run_job
+from hevopt.sweeps.store.ranking import best_designs
+from hevopt.sweeps.store.reading import open_to_read
+from hevopt.sweeps.workers.work import run_job
 
-REAL = "hevopt.sweeps.work:run_job"
+REAL = "hevopt.sweeps.workers.work:run_job"
 
 
 @pytest.fixture
@@ -219,9 +219,9 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)
 MEMORY = """
 import re, sys
 from pathlib import Path
-from hevopt.sweeps.jobs import Case, Job, Planned
+from hevopt.sweeps.plan.jobs import Case, Job, Planned
 from hevopt.sweeps.run import Execution, Plan, Watch, run_sweep
-from hevopt.sweeps.store import open_store
+from hevopt.sweeps.store.store import open_store
 import sweep_workers
 
 def peak_mb():

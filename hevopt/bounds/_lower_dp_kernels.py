@@ -1,0 +1,148 @@
+"""Compiled parts of the lower-bound dynamic program; the proof is in lower_dp.py."""
+
+import numpy as np
+
+from hevopt._compile import compiled
+from hevopt.problem._battery_kernels import chemical_power, drain_and_slope
+
+
+@compiled()
+def moves_by_tangents(first, power, step_s, steep, grid_low, cell, breaks, low, high, battery):
+    """(entry, piece) offset and rise of tangents above the move, in cells over nodes; move concave in energy.
+
+    Tangents touch within the window [low, high]. steep: (entry,) where the move counts as it is at `high`.
+    """
+    pieces = len(breaks) - 1
+    offset = np.empty((len(power), pieces))
+    rise = np.empty((len(power), pieces))
+    for k in range(len(step_s)):
+        scale = step_s[k] / cell
+        for i in range(first[k, 0], first[k, -1]):
+            for b in range(pieces):
+                middle = grid_low + cell * 0.5 * (breaks[b] + breaks[b + 1])
+                at = high if steep[i] else min(max(middle, low), high)
+                drain, slope = drain_and_slope(power[i], at, battery)
+                rise[i, b] = 0.0 if steep[i] else -step_s[k] * slope
+                offset[i, b] = -scale * drain - rise[i, b] * ((at - grid_low) / cell)
+    return offset, rise
+
+
+@compiled()
+def moves_by_cells(
+    first, power, step_s, cell, piece_j, edges, voltage, discharge, charging, efficiency
+):
+    """(entry, piece) greatest move in cells within each piece, from the best of every window cell it touches."""
+    pieces = len(piece_j) - 1
+    offset = np.full((len(power), pieces), -np.inf)
+    for k in range(len(step_s)):
+        for i in range(first[k, 0], first[k, -1]):
+            b = 0
+            for c in range(len(voltage)):
+                drain = chemical_power(power[i], voltage[c], discharge[c], charging[c], efficiency)
+                if np.isnan(drain):
+                    continue
+                while b < pieces - 1 and piece_j[b + 1] <= edges[c]:
+                    b += 1
+                n = b
+                while n < pieces and piece_j[n] < edges[c + 1]:
+                    offset[i, n] = max(offset[i, n], -step_s[k] * drain / cell)
+                    n += 1
+    return offset
+
+
+@compiled()
+def _lower_nodes(best, ahead, cost, share, rise):
+    for j in range(len(best)):
+        weight = share + rise * np.int32(j)
+        best[j] = min(best[j], cost + ahead[j] + weight * (ahead[j + 1] - ahead[j]))
+
+
+@compiled()
+def _raise_defects(defect, best, ahead, cost, share, rise):
+    for j in range(len(defect)):
+        weight = share + rise * np.int32(j)
+        line = weight * best[j] + (1.0 - weight) * best[j + 1]
+        defect[j] = max(defect[j], line - cost - ahead[j + 1])
+
+
+@compiled()
+def _run_end(low, high, start, rise, whole):
+    """First cell at or after `low` whose move start + rise (cell - low) has left `whole`, at most `high`."""
+    if rise <= 0.0:
+        return high
+    end = min(high, max(low + int(np.ceil((whole + 1 - start) / rise)), low + 1))
+    while end > low + 1 and start + rise * (end - 1 - low) > whole + 1:
+        end -= 1
+    return end
+
+
+@compiled()
+def lower_backward(
+    first, cost, switch_kg, allowed, terminal, breaks, offset, rise, floor_kg, unreachable_kg
+):
+    """(mode, node) lower bound of the cost-to-go before the first step; terminal: the same after the last."""
+    steps, modes, nodes = first.shape[0], first.shape[1] - 1, terminal.shape[1]
+    pieces = len(breaks) - 1
+    furthest = 0.0
+    for move in offset.flat:
+        if move > -1e300:
+            furthest = max(furthest, abs(move))
+    pad = 3 + int(np.ceil(furthest + nodes * np.max(rise)))
+    padded = np.empty((modes, nodes + 2 * pad))
+    best = np.empty((modes, nodes))
+    defect = np.empty(nodes - 1)
+    value = terminal.copy()
+    for k in range(steps - 1, -1, -1):
+        for n in range(modes):
+            for j in range(pad):
+                padded[n, pad - 1 - j] = value[n, 0] + floor_kg * (j + 1)
+                padded[n, pad + nodes + j] = value[n, nodes - 1]
+            padded[n, pad : pad + nodes] = value[n]
+        for n in range(modes):
+            best[n] = unreachable_kg
+            defect[:] = 0.0
+            for task in range(2):
+                for i in range(first[k, n], first[k, n + 1]):
+                    for b in range(pieces):
+                        if offset[i, b] < -1e300:
+                            continue
+                        # The move of a cell is the bound at its right end.
+                        low, high = breaks[b], breaks[b + 1]
+                        while low < high:
+                            start = offset[i, b] + rise[i, b] * (low + 1)
+                            whole = int(np.floor(start))
+                            end = _run_end(low, high, start, rise[i, b], whole)
+                            ahead = padded[n, pad + low + whole : pad + end + whole + 1]
+                            if task == 0:
+                                _lower_nodes(
+                                    best[n, low:end], ahead, cost[i], start - whole, rise[i, b]
+                                )
+                                if end == breaks[b + 1]:
+                                    # The piece's last node, under the move of the cell to its left.
+                                    share = start - whole + rise[i, b] * (end - 1 - low)
+                                    at = pad + end + whole
+                                    step = padded[n, at + 1] - padded[n, at]
+                                    best[n, end] = min(
+                                        best[n, end], cost[i] + padded[n, at] + share * step
+                                    )
+                            else:
+                                _raise_defects(
+                                    defect[low:end], best[n, low : end + 1], ahead, cost[i],
+                                    start - whole, rise[i, b],
+                                )  # fmt: skip
+                            low = end
+            least = np.inf
+            for j in range(nodes):
+                left = defect[j - 1] if j > 0 else 0.0
+                right = defect[j] if j < nodes - 1 else 0.0
+                least = min(least, best[n, j] - max(left, right))
+                padded[n, pad + j] = least
+        for n in range(modes):
+            best[n] = padded[n, pad : pad + nodes]
+        for m in range(modes):
+            value[m] = unreachable_kg
+            for n in range(modes):
+                if allowed[m, n]:
+                    for j in range(nodes):
+                        value[m, j] = min(value[m, j], switch_kg[m, n] + best[n, j])
+    return value

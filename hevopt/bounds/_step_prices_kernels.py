@@ -1,0 +1,136 @@
+"""Compiled parts of the duals with a price per step; the mathematics is in step_prices.py."""
+
+import numpy as np
+
+from hevopt._compile import compiled
+from hevopt.problem._battery_kernels import chemical_power, chemical_power_at, drain_and_slope
+
+# A step's price is at most this multiple of the next one's; any prices are valid.
+_GROWTH_MAX = 10.0
+
+
+@compiled()
+def costate(energy, power, step_s, battery):
+    """Prices (time,) of x_1 ... x_T that make a rollout stationary, 1 at the end."""
+    steps = len(power)
+    price = np.ones(steps)
+    for k in range(steps - 1, 0, -1):
+        _, slope = drain_and_slope(power[k], energy[k], battery)
+        price[k - 1] = price[k] * min(max(1.0 - step_s[k] * slope, 0.0), _GROWTH_MAX)
+    return price
+
+
+@compiled()
+def _worth_with_first_step(first, power, step_s, price, start, battery):
+    """(entry,) with the first step's entries filled: there x is the start's, and has no price of its own."""
+    worth = np.empty(len(power))
+    for i in range(first[0, 0], first[0, -1]):
+        worth[i] = price[0] * step_s[0] * chemical_power_at(power[i], start, battery)
+    return worth
+
+
+@compiled()
+def worth_by_tangents(first, power, step_s, price, start, rollout, steep, low, high, battery):
+    """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex and falling in x.
+
+    steep: (entry,) whether r is too steep somewhere for a tangent; then r is at least its value at `high`
+    """
+    worth = _worth_with_first_step(first, power, step_s, price, start, battery)
+    for k in range(1, len(step_s)):
+        after = price[k]
+        tilt = price[k - 1] - after
+        middle = min(max(rollout[k], low), high)
+        for i in range(first[k, 0], first[k, -1]):
+            if steep[i]:
+                drain = chemical_power_at(power[i], high, battery)
+                worth[i] = after * step_s[k] * drain + min(tilt * low, tilt * high)
+                continue
+            best = -np.inf
+            left_x, left_y, left_s = 0.0, 0.0, 0.0
+            for n in range(3):
+                x = low if n == 0 else (middle if n == 1 else high)
+                drain, slope = drain_and_slope(power[i], x, battery)
+                y = after * step_s[k] * drain + tilt * x
+                s = after * step_s[k] * slope + tilt
+                if s >= 0.0:
+                    # The envelope turns upward here: its least is where this tangent meets the last.
+                    best = y if n == 0 else _meeting(left_x, left_y, left_s, x, y, s)
+                    break
+                left_x, left_y, left_s = x, y, s
+                best = y
+            worth[i] = best
+    return worth
+
+
+@compiled()
+def _meeting(x1, y1, s1, x2, y2, s2):
+    """Height at which a falling tangent at x1 meets a rising one at x2, never above it."""
+    if s2 - s1 <= 0.0:
+        return min(y1, y2)
+    x = (y2 - s2 * x2 - y1 + s1 * x1) / (s1 - s2)
+    x = min(max(x, x1), x2)
+    return min(y1 + s1 * (x - x1), y2 + s2 * (x - x2))
+
+
+@compiled()
+def worth_by_cells(
+    first, power, step_s, price, start, edges, voltage, discharge, charging, battery
+):
+    """As worth_by_tangents, for any curves: the least over cells, r from below within each."""
+    worth = _worth_with_first_step(first, power, step_s, price, start, battery)
+    efficiency = battery.coulombic_efficiency
+    for k in range(1, len(step_s)):
+        after = price[k]
+        tilt = price[k - 1] - after
+        for i in range(first[k, 0], first[k, -1]):
+            best = np.inf
+            for c in range(len(voltage)):
+                drain = chemical_power(power[i], voltage[c], discharge[c], charging[c], efficiency)
+                if np.isnan(drain):
+                    continue
+                x = edges[c] if tilt >= 0.0 else edges[c + 1]
+                best = min(best, after * step_s[k] * drain + tilt * x)
+            worth[i] = best
+    return worth
+
+
+@compiled()
+def linear_steps(first, power, step_s, energy, rollout_power, battery):
+    """Fall of energy of every entry at the rollout, (entry,), and the share of x a step keeps, (time,)."""
+    drain = np.empty(len(power))
+    keep = np.empty(len(step_s))
+    for k in range(len(step_s)):
+        _, slope = drain_and_slope(rollout_power[k], energy[k], battery)
+        keep[k] = 1.0 - step_s[k] * slope
+        for i in range(first[k, 0], first[k, -1]):
+            drain[i] = step_s[k] * chemical_power_at(power[i], energy[k], battery)
+    return drain, keep
+
+
+@compiled()
+def lower_hull(step, drain, cost, order):
+    """(entry,) whether an entry is a corner of its step's lower hull of cost over drain, falling part.
+
+    order: entries sorted by step, then drain, then cost. Mixtures of corners cost no more than any other entry.
+    """
+    count = len(order)
+    stack = np.empty(count, dtype=np.int64)
+    kept = np.zeros(count, dtype=np.bool_)
+    bottom = top = 0
+    for place in range(count):
+        i = order[place]
+        if place == 0 or step[i] != step[order[place - 1]]:
+            bottom = top
+        if top > bottom and cost[i] >= cost[stack[top - 1]]:
+            continue
+        while top - bottom >= 2:
+            a, b = stack[top - 2], stack[top - 1]
+            if (cost[b] - cost[a]) * (drain[i] - drain[a]) < (cost[i] - cost[a]) * (
+                drain[b] - drain[a]
+            ):
+                break
+            top -= 1
+        stack[top] = i
+        top += 1
+    kept[stack[:top]] = True
+    return kept

@@ -1,0 +1,178 @@
+"""Certificates: how little any plan could cost on the same problem, with the kind of proof.
+
+A ladder of proofs, each dearer than the one before. The first two take milliseconds; the others are tried only
+while the rollout's gap is above a target.
+
+    one multiplier   one price on stored energy (prices.py)
+    costate prices   a price per step, from the costate equation along the rollout (step_prices.py)
+    LP prices        a price per step, from a linear program, where the rollout touches the window (step_prices.py)
+    lower-bound DP   a cost-to-go that is nowhere above the true one, for costs of switching (lower_dp.py)
+
+A bound holds for the tabulated controls, for every strategy alike. The first three hold for every end charge,
+moving with it by their price at the end; the last one for the asked end charge or more. Each is lowered by what
+rounding could have added (prices.py, lower_dp.py) and then held against the plan in hand: one above it is an error.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from math import inf
+
+import numpy as np
+
+from hevopt.bounds.lower_dp import end_slack_j, lower_bound_kg
+from hevopt.bounds.prices import EPSILON, Line, one_price_dual
+from hevopt.bounds.step_prices import costate_dual, lp_dual
+from hevopt.errors import SolverError
+from hevopt.problem.problem import Problem, Trajectory
+
+TARGET_GAP = 5e-4
+LOWER_DP_NODES = (16_001, 64_001)
+# Share of the window within which a rollout counts as touching its end.
+_TOUCH = 2e-3
+
+
+class Proof(StrEnum):
+    """How a bound was proven."""
+
+    ONE_MULTIPLIER = "one multiplier"
+    COSTATE_PRICES = "costate prices"
+    LP_PRICES = "LP prices"
+    LOWER_BOUND_DP = "lower-bound DP"
+
+
+class Scope(StrEnum):
+    """What a bound speaks of: the table's controls, not a continuous split between them."""
+
+    TABULATED = "tabulated controls"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What a bound is. Text of results saved by another version may name a proof that this one does not know."""
+
+    proof: Proof | str
+    scope: Scope | str = Scope.TABULATED
+
+    def __str__(self) -> str:
+        return f"{self.proof}, {self.scope}" if self.scope else str(self.proof)
+
+    @classmethod
+    def read(cls, text: object) -> "Claim":
+        """The claim that a saved text stands for; ValueError for what is no text."""
+        if not isinstance(text, str):
+            raise ValueError("not the certificate of a row")
+        proof, _, scope = text.partition(", ")
+        return cls(
+            Proof(proof) if proof in set(Proof) else proof,
+            Scope(scope) if scope in set(Scope) else scope,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """Bounds on cost (kg: fuel, plus weighted NOx) for any end charge, as supporting lines.
+
+    proofs: kind of proof -> its lines; the highest line at an end charge is the bound there
+    at_least: kind of proof -> bound for end charges of end_min_j or more, end_slack_j less by rounding
+    failures: kind of proof -> why it was tried and not found
+    """
+
+    end_min_j: float
+    proofs: dict[Proof, list[Line]]
+    at_least: dict[Proof, float] = field(default_factory=dict)
+    failures: dict[Proof, str] = field(default_factory=dict)
+    end_slack_j: float = 0.0
+
+    def bound_kg(self, end_j: float) -> tuple[float, Proof]:
+        """The highest proven bound for plans that end with at least `end_j`, and its kind of proof."""
+        return max(self._bounds(end_j))
+
+    def bound_of(self, plan: Trajectory) -> tuple[float, Proof]:
+        """The bound at a plan's own end charge and its kind of proof; at most the plan's cost, within rounding.
+
+        Raises SolverError where a proof contradicts the plan.
+        """
+        bounds = self._bounds(plan.end_j)
+        for bound, kind in bounds:
+            if bound - plan.cost_kg > _cost_rounding_kg(plan):
+                raise SolverError(
+                    f"the proof contradicts a plan: by {kind} no plan that ends with its charge costs less than "
+                    f"{bound:.12g} kg, and it costs {plan.cost_kg:.12g} kg; this is a fault of hevopt, not of "
+                    "the inputs: please report this, with the inputs"
+                )
+        bound, kind = max(bounds)
+        return min(bound, plan.cost_kg), kind
+
+    def _bounds(self, end_j: float) -> list[tuple[float, Proof]]:
+        extra_j = end_j - self.end_min_j
+        rounding_j = 4 * EPSILON * (abs(end_j) + abs(self.end_min_j))
+        bounds = [
+            (line.value_kg + line.price_kgpj * (extra_j - rounding_j), kind)
+            for kind, lines in self.proofs.items()
+            for line in lines
+        ]
+        if extra_j >= -self.end_slack_j:
+            bounds += [(bound, kind) for kind, bound in self.at_least.items()]
+        return bounds
+
+    @property
+    def price_kgpj(self) -> float:
+        """What a joule of end charge is worth on this problem: the price of the highest line."""
+        lines = [line for group in self.proofs.values() for line in group]
+        return max(lines, key=lambda line: line.value_kg).price_kgpj
+
+
+def certify(
+    problem: Problem, rollout: Trajectory | None = None, *, target_gap: float = TARGET_GAP
+) -> Certificate:
+    """The certificate of a problem; with a rollout, its costate prices, and dearer rungs up to `target_gap`.
+
+    A rung that fails is left out and named in `failures`. Raises SolverError where a bound is above the rollout.
+    """
+    lines = one_price_dual(problem)
+    certificate = Certificate(
+        problem.end_min_j, {Proof.ONE_MULTIPLIER: lines}, end_slack_j=end_slack_j(problem)
+    )
+    if rollout is None:
+        return certificate
+    worth = certificate.price_kgpj
+    _gap(certificate, rollout)
+    _try_prices(certificate, Proof.COSTATE_PRICES, lambda: costate_dual(problem, rollout))
+    gap = _gap(certificate, rollout)
+    if gap > target_gap and _touches_window(problem, rollout):
+        _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout))
+        gap = _gap(certificate, rollout)
+    for nodes in LOWER_DP_NODES:
+        if gap <= target_gap:
+            break
+        best = certificate.at_least.get(Proof.LOWER_BOUND_DP, -inf)
+        bound = lower_bound_kg(problem, worth, nodes=nodes)
+        certificate.at_least[Proof.LOWER_BOUND_DP] = max(best, bound)
+        gap = _gap(certificate, rollout)
+    return certificate
+
+
+def _try_prices(certificate: Certificate, kind: Proof, lines: Callable[[], list[Line]]) -> None:
+    """Add a rung; without its prices there is no proof of the kind, and the next one needs none."""
+    try:
+        certificate.proofs[kind] = lines()
+    except SolverError as error:
+        certificate.failures[kind] = str(error)
+
+
+def _touches_window(problem: Problem, rollout: Trajectory) -> bool:
+    low, high = problem.window_j
+    margin = _TOUCH * (high - low)
+    return bool((rollout.energy_j < low + margin).any() or (rollout.energy_j > high - margin).any())
+
+
+def _gap(certificate: Certificate, rollout: Trajectory) -> float:
+    """How far the rollout is above its bound; every bound is held against it on the way."""
+    bound, _ = certificate.bound_of(rollout)
+    return (rollout.cost_kg - bound) / max(abs(bound), 1e-300)
+
+
+def _cost_rounding_kg(plan: Trajectory) -> float:
+    terms = float(np.sum(np.abs(plan.fuel_kg))) + abs(plan.cost_kg)
+    return EPSILON * (2 * len(plan.fuel_kg) + 48) * terms

@@ -1,0 +1,204 @@
+"""Duals with a price for every step: tighter where losses depend on charge, or where the SOC window binds.
+
+With prices p_1 ... p_T on stored energy x_1 ... x_T and the step x_t+1 = x_t - r_t(x_t, u), Lagrange duality gives,
+for every choice of prices >= 0, a bound on every feasible plan:
+
+    g(p) = sum over t of  min over u, x of [cost_t(u) + p_t+1 r_t(x, u) + (p_t - p_t+1) x]  + switching
+           + p_T x_end - p_1 x_start
+
+with x within the SOC window (t = 0: x = x_start and no x term) and the switching costs exact, a shortest path over
+modes. g is positively homogeneous in p but for the costs, so a shape of p is scaled to the maximum of g
+(prices.py).
+Shapes, both along a rollout:
+    costate prices  p_t = p_t+1 (1 - dr_t/dx): then x is stationary where the rollout is
+    LP prices       multipliers of the linear program that lets controls be mixed, ignores switching and keeps x
+                    within the window, its losses linear in x around the rollout: they jump where the window binds.
+                    Whatever the LP's tolerance, g is evaluated afresh and stays a bound.
+
+The inner minimum over x. All curves are cut to the window (Battery.within_window): a kernel cannot look beyond it.
+Where resistance is constant and U² linear in stored energy, as where Uoc is linear in SOC, r is convex in x:
+with c = 4 R P and a = U², r is (a - sqrt(a (a - c))) / 2R, for charging times the coulombic efficiency; the root,
+of a square less a square, is concave in a, so r is convex in a, and a is linear in x. r falls with a. Tangents at
+the window's ends and at the rollout lie below it, and the least of their upper envelope below its minimum.
+Nothing rests on how nearly linear a curve is: tangents are taken on a line that is nowhere below U², at the lowest
+resistance, which loses no more than the battery (`line_above`). It is used where it lies close to the curve. For
+other batteries the window is cut into cells; in each, r is at least its value at the cell's highest voltage and
+lowest resistance.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.bounds import _step_prices_kernels as kernels
+from hevopt.bounds.prices import EPSILON, STEEPEST, Line, bounded_choices, dual, priced_rounding
+from hevopt.errors import SolverError
+from hevopt.problem import _battery_kernels as battery_kernels
+from hevopt.problem import battery as battery_model
+from hevopt.problem._battery_kernels import BatteryArrays
+from hevopt.problem.choices import Choices, without_dominated
+from hevopt.problem.problem import Problem, Trajectory
+
+Array = NDArray[np.float64]
+CELLS = 256
+# Longer drives are given to the linear program in parts: its time grows faster than their length.
+_LP_STEPS, _LP_OVERLAP = 4000, 1000
+# Share of the highest U² by which a curve may leave a straight line and still be taken for one.
+_STRAIGHT = 1e-7
+
+
+def costate_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
+    """Lines of the dual whose prices follow the costate equation along a rollout, the highest last."""
+    inside = problem.battery.within_window()
+    power, step_s = rollout.battery_power_w, problem.table.step_s
+    return dual_of_shape(problem, rollout, kernels.costate(rollout.energy_j, power, step_s, inside))
+
+
+def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
+    """Lines of the dual whose prices are the multipliers of the linear program, the highest last."""
+    return dual_of_shape(problem, rollout, lp_prices_kgpj(problem, rollout))
+
+
+def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[Line]:
+    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0."""
+    if not (np.isfinite(price).all() and (price >= 0).all()):
+        raise SolverError("the prices of stored energy are not all finite and >= 0")
+    choices = without_dominated(bounded_choices(problem))
+    inside, step_s = problem.battery.within_window(), problem.table.step_s
+    line = line_above(inside)
+    arguments = choices.first, choices.power_w, step_s, price, problem.start_j
+    if line is not None:
+        worth = kernels.worth_by_tangents(
+            *arguments, rollout.energy_j, steep(choices, line), *line.energy_j, line
+        )
+    else:
+        worth = kernels.worth_by_cells(*arguments, *window_cells(problem, CELLS), inside)
+    constant = price[-1] * problem.end_min_j - price[0] * problem.start_j
+    rounding = priced_rounding(problem, choices, price, tangents=line is not None)
+    return dual(problem, choices, worth, float(constant), float(price[-1]), rounding)
+
+
+def line_above(inside: BatteryArrays) -> BatteryArrays | None:
+    """A battery of one segment that loses no more than one cut to the window, at any stored energy there.
+
+    Its U² is linear in stored energy and nowhere below the curve's, its resistances are the lowest. None where
+    curve and line lie apart.
+    """
+    energy, squared = inside.energy_j, inside.open_circuit_v**2
+    chord = np.interp(energy, energy[[0, -1]], squared[[0, -1]])
+    over = squared - chord
+    ohms = inside.discharge_ohm, inside.charge_ohm
+    apart = [np.ptp(ohm) > _STRAIGHT * ohm.max() for ohm in ohms]
+    if np.abs(over).max() > _STRAIGHT * squared[-1] or any(apart):
+        return None
+    raised = np.sqrt(squared[[0, -1]] + max(over.max(), 0.0)) * (1 + 4 * EPSILON)
+    width = 2 * (energy[-1] - energy[0]) / (inside.capacity_as * raised.sum())
+    return BatteryArrays(
+        np.array([0.0, width]), raised, *(np.full(2, ohm.min()) for ohm in ohms),
+        energy[[0, -1]], inside.capacity_as, inside.coulombic_efficiency,
+    )  # fmt: skip
+
+
+def steep(choices: Choices, battery: BatteryArrays) -> NDArray[np.bool_]:
+    """(entry,) whether a power comes so near the voltage's peak that no tangent is of use."""
+    return battery_kernels.amplification(choices.power_w, battery) > STEEPEST
+
+
+def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
+    """(time,) multipliers of the energy steps: minimise cost over mixtures of controls, x in the window.
+
+    Long drives are given to it in parts, from the end. Each reaches into the next by some steps, counts what is
+    left there at the price that the next has found for it, and is believed up to where the next begins.
+    """
+    choices = without_dominated(bounded_choices(problem))
+    count = -(-choices.steps // _LP_STEPS)
+    ends = np.arange(count + 1) * choices.steps // count
+    price = np.zeros(choices.steps)
+    low, _ = problem.window_j
+    for begin, end in reversed(list(pairwise(ends))):
+        reach = min(end + _LP_OVERLAP, choices.steps)
+        wanted = (problem.end_min_j, 0.0) if reach == choices.steps else (low, price[reach - 1])
+        along = rollout.energy_j[begin:reach], rollout.battery_power_w[begin:reach]
+        found = _lp_part(problem, choices.part(begin, reach), *along, *wanted)
+        price[begin:end] = found[: end - begin]
+    return price
+
+
+def _lp_part(
+    problem: Problem,
+    choices: Choices,
+    energy_j: Array,
+    power_w: Array,
+    end_min_j: float,
+    end_price_kgpj: float,
+) -> Array:
+    """(time,) multipliers of consecutive steps, what is left at their end being at least end_min_j and priced.
+
+    energy_j, power_w: (time,) along a rollout, whose first stored energy is where they start
+
+    The mixtures of a step cost the lower hull of its controls' cost over drain; from the corner of least drain
+    the hull falls segment by segment, ever less steeply, so that segments bounded by 0 and 1 are all it needs.
+    """
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_array
+
+    step = choices.spread(np.arange(choices.steps))
+    drain_j, keep_j = kernels.linear_steps(
+        choices.first, choices.power_w, choices.step_s, energy_j, power_w,
+        problem.battery.within_window(),
+    )  # fmt: skip
+    order = np.lexsort((choices.cost_kg, drain_j, step))
+    corner = order[kernels.lower_hull(step, drain_j, choices.cost_kg, order)[order]]
+    step, drain_j, cost_kg = step[corner], drain_j[corner], choices.cost_kg[corner]
+    inside = step[1:] == step[:-1]
+    least_j = drain_j[np.append(True, ~inside)]
+    segment_step = step[1:][inside]
+    segments, steps = len(segment_step), choices.steps
+    low, high = problem.window_j
+    # Columns: share of every segment, then x_1 ... x_T. Energy may be thrown away: rows <=.
+    scale_j = high - low
+    following, present = segments + np.arange(steps), segments + np.arange(steps - 1)
+    rows = csr_array(
+        (
+            np.concatenate([np.diff(drain_j)[inside] / scale_j, np.ones(steps), -keep_j[1:]]),
+            (
+                np.concatenate([segment_step, np.arange(steps), np.arange(1, steps)]),
+                np.concatenate([np.arange(segments), following, present]),
+            ),
+        ),
+        shape=(steps, segments + steps),
+    )
+    offset = ((1.0 - keep_j) * energy_j - least_j) / scale_j
+    offset[0] += keep_j[0] * energy_j[0] / scale_j
+    bounds = np.empty((segments + steps, 2))
+    bounds[:segments] = 0.0, 1.0
+    bounds[segments:] = low / scale_j, high / scale_j
+    bounds[-1, 0] = end_min_j / scale_j
+    # In units of the steps' own costs, so that the solver's tolerance is a share of them.
+    unit_kg = float(np.max(np.abs(np.diff(cost_kg)[inside]), initial=0.0)) or 1.0
+    cost = np.concatenate([np.diff(cost_kg)[inside] / unit_kg, np.zeros(steps)])
+    cost[-1] -= end_price_kgpj * scale_j / unit_kg
+    result = linprog(
+        cost, A_ub=rows, b_ub=offset, bounds=bounds, method="highs",
+    )  # fmt: skip
+    if result.status != 0:
+        raise SolverError(f"HiGHS stopped with status {result.status}: {result.message}")
+    # A joule more after step t saves p: the multiplier of its row is -p.
+    return np.maximum(-result.ineqlin.marginals * (unit_kg / scale_j), 0.0)
+
+
+def window_cells(problem: Problem, cells: int) -> tuple[Array, Array, Array, Array]:
+    """Edges (cell + 1,) over the window, with every point of the curves among them, and per cell the highest
+    voltage and the lowest discharge and charge resistance."""
+    inside = problem.battery.within_window()
+    even = np.linspace(inside.soc[0], inside.soc[-1], cells + 1)
+    edges_soc = np.union1d(even, inside.soc)
+    voltage, discharge, charge = (
+        np.interp(edges_soc, inside.soc, curve)
+        for curve in (inside.open_circuit_v, inside.discharge_ohm, inside.charge_ohm)
+    )
+    lower = [np.minimum(r[1:], r[:-1]) for r in (discharge, charge)]
+    edges = battery_model.energy_j(problem.battery, edges_soc)
+    edges[[0, -1]] = inside.energy_j[[0, -1]]
+    return edges, voltage[1:], *lower

@@ -1,0 +1,1 @@
+"""What a car is: components and their physics, as types; no file is read here."""

@@ -1,0 +1,75 @@
+"""Architecture and component files: TOML, checked by pydantic, read into frozen types.
+
+An architecture names its components; a name is looked for in `components/` beside the file, then among the
+shipped ones, and a path is relative to the file. Any key of either can be changed on reading, by its path.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from hevopt.car.engine import Engine
+from hevopt.car.machine import Machine
+from hevopt.car.transmission import Gearbox
+from hevopt.car.vehicle import Vehicle
+from hevopt.errors import DataError
+from hevopt.problem.battery import Battery
+
+Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
+
+
+CouplingKind = Literal[
+    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """How the machine joins the shafts; see couplings.py."""
+
+    kind: CouplingKind
+    second_clutch: bool
+    machine_ratio: float
+    machine_efficiency: float
+    disconnects_above_speed_max: bool
+    machine_shift_fuel_kg: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Architecture:
+    """A complete car: every component, the coupling and the functions it may use.
+
+    soc_end: least state of charge at the end of a cycle
+    contents: keys and values as read, changes made, the components' tables in place of their names
+    files: where they were read from, the architecture first
+    """
+
+    name: str
+    description: str
+    vehicle: Vehicle
+    engine: Engine
+    gearbox: Gearbox
+    machine: Machine
+    battery: Battery
+    soc_start: float
+    soc_end: float
+    coupling: Coupling
+    functions: frozenset[str]
+    gear: Literal["cycle", "free"]
+    contents: Mapping[str, Any]
+    files: tuple[Path, ...]
+
+    @property
+    def source(self) -> Path:
+        """The architecture's own file."""
+        return self.files[0]
+
+    def with_free_gear(self) -> "Architecture":
+        """The same car with the engine's gear as a control; DataError where its gearbox does not allow it."""
+        if self.gearbox.shift_fuel_kg is None:
+            raise DataError(
+                f"{self.source}: gear 'free' needs the table [free_gear] with shift_fuel_g and "
+                f"engine_speed_min_rpm in the file of gearbox {self.gearbox.name!r}"
+            )
+        return replace(self, gear="free", contents={**self.contents, "gear": "free"})

@@ -1,0 +1,95 @@
+"""What a battery's file may hold: cells in series, their voltage and resistance, the window of their charge."""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hevopt.car_files.fields import (
+    Fraction,
+    List,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Shape,
+    Soc,
+    Table,
+)
+from hevopt.files.toml import FileModel
+
+Ohm = Annotated[Annotated[NotNegative, Number] | Annotated[list[NotNegative], List], Shape]
+
+
+class LinearVoltageFile(FileModel):
+    intercept: Positive
+    slope: NotNegative
+
+
+class SocFile(FileModel):
+    """Window and start of the state of charge; `end` is the least at the end, by default the start."""
+
+    start: Soc
+    min: Soc
+    max: Soc
+    end: Soc | None = None
+
+    @model_validator(mode="after")
+    def _window(self):
+        if not self.min < self.max:
+            raise ValueError(f"empty window: min {self.min:g} must be below max {self.max:g}")
+        if not self.min <= self.start <= self.max:
+            raise ValueError(f"start {self.start:g} must lie in [{self.min:g}, {self.max:g}]")
+        if self.end is not None and not self.min <= self.end <= self.max:
+            raise ValueError(f"end {self.end:g} must lie in [{self.min:g}, {self.max:g}]")
+        least = self.start if self.end is None else self.end
+        if least == self.max:
+            raise ValueError(
+                f"the least charge at the end, {least:g}, is max itself, which no plan meets exactly; give end a "
+                "value below max, such as 0.01 less, or raise max"
+            )
+        return self
+
+
+class BatteryFile(FileModel):
+    """A battery of equal cells in series, figures per cell, over SOC where they are lists."""
+
+    name: Name
+    cells_in_series: Annotated[int, Field(ge=1, le=10_000)]
+    capacity_ah: Positive
+    open_circuit_v: Annotated[
+        Annotated[LinearVoltageFile, Table] | Annotated[list[Positive], List], Shape
+    ]
+    resistance_ohm: Ohm | None = None
+    discharge_ohm: Ohm | None = None
+    charge_ohm: Ohm | None = None
+    curve_soc: list[Soc] | None = None
+    coulombic_efficiency: Fraction = 1.0
+    power_max_w: Positive | None = None
+    current_max_a: Positive | None = None
+    soc: SocFile
+
+    @model_validator(mode="after")
+    def _curves(self):
+        given = self.model_fields_set & {"resistance_ohm", "discharge_ohm", "charge_ohm"}
+        if given not in ({"resistance_ohm"}, {"discharge_ohm", "charge_ohm"}):
+            raise ValueError(
+                "give either resistance_ohm, or discharge_ohm and charge_ohm; found: "
+                f"{', '.join(sorted(given)) or 'none'}"
+            )
+        lists = [v for v in (self.open_circuit_v, *self.resistances()) if isinstance(v, list)]
+        if lists and self.curve_soc is None:
+            raise ValueError("values over SOC need curve_soc")
+        if any(len(v) != len(self.curve_soc) for v in lists):
+            raise ValueError(f"values over SOC need {len(self.curve_soc)} entries, as curve_soc")
+        if self.curve_soc is not None and (
+            len(self.curve_soc) < 2 or (np.diff(self.curve_soc) <= 0).any()
+        ):
+            raise ValueError("curve_soc must increase and have at least 2 entries")
+        return self
+
+    def resistances(self) -> tuple:
+        """Discharge and charge resistance as given."""
+        if self.resistance_ohm is not None:
+            return self.resistance_ohm, self.resistance_ohm
+        return self.discharge_ohm, self.charge_ohm

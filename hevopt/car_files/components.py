@@ -1,0 +1,155 @@
+"""From checked component files to components in SI units."""
+
+from math import inf
+
+import numpy as np
+
+from hevopt.car.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
+from hevopt.car.machine import LossGrid, Machine, TorqueCurve
+from hevopt.car.scaling import scaled_engine, scaled_machine
+from hevopt.car.transmission import Gearbox
+from hevopt.car.vehicle import Vehicle
+from hevopt.car_files.battery import BatteryFile, LinearVoltageFile
+from hevopt.car_files.car import CarFile
+from hevopt.car_files.engine import EngineFile
+from hevopt.car_files.fields import FullLoadFile
+from hevopt.car_files.gearbox import GearboxFile
+from hevopt.car_files.machine import LossMapFile, MachineFile
+from hevopt.errors import DataError
+from hevopt.problem.battery import Battery
+from hevopt.units import STANDARD_GRAVITY_MPS2, TO_SI
+
+_MASS_MIN_KG = 50.0
+
+
+def vehicle_of(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
+    """The vehicle of a car's file and the mass that an architecture adds; DataError where the sum is too small."""
+    load, mass_kg = car.road_load, car.mass_kg + hybrid_mass_kg
+    if mass_kg < _MASS_MIN_KG:
+        raise DataError(
+            f"mass_kg {car.mass_kg:g} and the architecture's hybrid_mass_kg {hybrid_mass_kg:g} add up "
+            f"to {mass_kg:g} kg; allowed: {_MASS_MIN_KG:g} kg or more; raise one of them"
+        )
+    if load.coastdown_c0_n is not None:
+        rolling = (0.0, 0.0, 0.0, 0.0)
+        air = (load.coastdown_c0_n, load.coastdown_c1_nspm, load.coastdown_c2_ns2pm2, 0.0)
+        if load.coastdown_mass_kg is not None:  # C0 as rolling resistance, in proportion to weight
+            rolling = (load.coastdown_c0_n * mass_kg / load.coastdown_mass_kg, 0.0, 0.0, 0.0)
+            air = (0.0, *air[1:])
+    else:
+        weight_n = mass_kg * STANDARD_GRAVITY_MPS2
+        polynomial = (
+            load.rolling_c0,
+            load.rolling_c1_spm,
+            load.rolling_c2_s2pm2,
+            load.rolling_c3_s3pm3,
+        )
+        rolling = tuple(weight_n * c for c in polynomial)
+        air = (0.0, 0.0, load.air_density_kgpm3 / 2 * load.drag_area_m2, 0.0)
+    return Vehicle(
+        car.name,
+        mass_kg,
+        car.tyre_radius_m,
+        car.wheel_inertia_kgm2,
+        car.auxiliary_power_w,
+        rolling,
+        air,
+    )
+
+
+def engine_of(data: EngineFile) -> Engine:
+    """The engine of its file, scaled where the file says so."""
+    rpm, gram = TO_SI["_rpm"][1], TO_SI["_g"][1]
+    if data.fuel_map is not None:
+        grid = data.fuel_map
+        fuel = EngineGrid(
+            np.array(grid.speed_rpm) * rpm,
+            np.array(grid.torque_nm),
+            np.array(grid.fuel_gps) * gram,
+            None if grid.nox_gps is None else np.array(grid.nox_gps) * gram,
+            np.array(grid.motoring_torque_nm),
+        )
+    else:
+        fuel = FuelCoefficients(**data.fuel_coefficients.model_dump())
+    nox = data.nox_coefficients
+    engine = Engine(
+        name=data.name,
+        displacement_m3=data.displacement_cm3 * TO_SI["_cm3"][1],
+        stroke_m=data.stroke_mm * TO_SI["_mm"][1],
+        idle_radps=data.idle_rpm * rpm,
+        inertia_kgm2=data.inertia_kgm2,
+        start_fuel_kg=data.start_fuel_g * gram,
+        heating_value_jpkg=data.fuel.heating_value_mjpkg * TO_SI["_mjpkg"][1],
+        fuel_density_kgpm3=data.fuel.density_kgpl * TO_SI["_kgpl"][1],
+        co2_kgpkg=data.fuel.co2_kgpkg,
+        full_load_speed_radps=np.array(data.full_load.speed_rpm) * rpm,
+        full_load_torque_nm=np.array(data.full_load.torque_nm),
+        fuel=fuel,
+        nox=None if nox is None else NoxCoefficients(**nox.model_dump()),
+    )
+    return engine if data.scale is None else scaled_engine(engine, data.scale.factor)
+
+
+def gearbox_of(data: GearboxFile) -> Gearbox:
+    """The gearbox of its file; gear 0, neutral, stands first."""
+    gears, kmh, free = len(data.ratios), TO_SI["_kmh"][1], data.free_gear
+    efficiency = data.efficiency if isinstance(data.efficiency, list) else [data.efficiency] * gears
+    return Gearbox(
+        data.name,
+        np.array([1.0, *data.ratios]) * data.final_drive_ratio,
+        np.array([1.0, *efficiency]),
+        np.array(data.shift_speeds.up_kmh) * kmh,
+        np.array(data.shift_speeds.down_kmh) * kmh,
+        data.shift_speeds.engage_before_launch_s,
+        None if free is None else free.shift_fuel_g * TO_SI["_g"][1],
+        0.0 if free is None else free.engine_speed_min_rpm * TO_SI["_rpm"][1],
+    )
+
+
+def machine_of(data: MachineFile) -> Machine:
+    """The machine of its file, scaled where the file says so."""
+    loss = (data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
+    if data.loss_map is not None:
+        loss = _loss_grid(data.loss_map)
+    machine = Machine(
+        data.name,
+        data.power_max_w,
+        data.torque_max_nm or inf,
+        (data.speed_max_rpm or inf) * TO_SI["_rpm"][1],
+        data.inertia_kgm2,
+        None if data.kind == "efficiency" else loss,
+        data.efficiency,
+        None if data.full_load is None else _torque_curve(data.full_load),
+    )
+    return machine if data.scale is None else scaled_machine(machine, data.scale.factor)
+
+
+def _torque_curve(data: FullLoadFile) -> TorqueCurve:
+    return TorqueCurve(np.array(data.speed_rpm) * TO_SI["_rpm"][1], np.array(data.torque_nm))
+
+
+def _loss_grid(data: LossMapFile) -> LossGrid:
+    torque, loss = np.array(data.torque_nm), np.array(data.loss_w)
+    if data.symmetric:
+        above = torque > 0
+        torque = np.concatenate([-torque[above][::-1], torque])
+        loss = np.hstack([loss[:, above][:, ::-1], loss])
+    return LossGrid(np.array(data.speed_rpm) * TO_SI["_rpm"][1], torque, loss)
+
+
+def battery_of(data: BatteryFile) -> Battery:
+    """The battery of its file, as one pack of all its cells."""
+    cells = data.cells_in_series
+    points = np.array(data.curve_soc or [0.0, 1.0])
+    voltage = data.open_circuit_v
+    if isinstance(voltage, LinearVoltageFile):
+        voltage = voltage.intercept + voltage.slope * points
+    discharge, charge = (np.broadcast_to(r, points.shape) * cells for r in data.resistances())
+    power_max_w = (data.power_max_w or inf) * cells
+    current_max_a = data.current_max_a or inf
+    return Battery(
+        points, np.array(voltage) * cells, discharge, charge,
+        data.capacity_ah * TO_SI["_ah"][1], data.coulombic_efficiency,
+        data.soc.min, data.soc.max,
+        power_max_w, power_max_w, current_max_a, current_max_a,
+    )  # fmt: skip

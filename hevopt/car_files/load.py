@@ -1,0 +1,138 @@
+"""Carried out of hevopt/architecture.py."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from hevopt.car.architecture import Architecture, Coupling
+from hevopt.car_files.architecture import ArchitectureFile, CouplingFile
+from hevopt.car_files.battery import BatteryFile
+from hevopt.car_files.car import CarFile
+from hevopt.car_files.components import battery_of, engine_of, gearbox_of, machine_of, vehicle_of
+from hevopt.car_files.engine import EngineFile
+from hevopt.car_files.gearbox import GearboxFile
+from hevopt.car_files.machine import MachineFile
+from hevopt.errors import DataError
+from hevopt.files.keypaths import merged, with_changes
+from hevopt.files.lookup import find, is_path, shipped_folder
+from hevopt.files.shown import printable, shown
+from hevopt.files.toml import Model, checked, read_contents
+from hevopt.units import TO_SI
+
+Built = TypeVar("Built")
+
+
+COMPONENTS = ("car", "engine", "gearbox", "machine", "battery")
+
+
+def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None) -> Architecture:
+    """The architecture of a shipped name (`C2`) or a TOML file's path.
+
+    changes: key path -> value in place of the file's, such as {"hybrid_mass_kg": 80, "machine.power_max_w": 2e4};
+    a path that begins with a component goes into that component's file. Raises DataError as for the file itself.
+    """
+    path = find("architectures", name, ".toml")
+    own, of_parts = sorted_changes(changes or {})
+    contents = with_changes(read_contents(path), own)
+    data = checked(_place(str(path), own), contents, ArchitectureFile)
+    contents, files = dict(contents), [path]
+
+    def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built:
+        found = component_contents(path, key, getattr(data, key), of_parts[key])
+        contents[key] = found.contents
+        files.append(found.file)
+        file = checked(found.place, found.contents, model)
+        try:
+            return build(file)
+        except DataError as error:
+            raise DataError(f"{found.place}: {error}") from None
+
+    battery, soc = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
+    gearbox = part("gearbox", GearboxFile, gearbox_of)
+    if data.coupling.kind == "even_shaft" and len(gearbox.ratios) < 3:
+        raise DataError(
+            f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
+            "or more; choose another gearbox or kind"
+        )
+    car = Architecture(
+        name=data.name,
+        description=data.description,
+        vehicle=part("car", CarFile, lambda file: vehicle_of(file, data.hybrid_mass_kg)),
+        engine=part("engine", EngineFile, engine_of),
+        gearbox=gearbox,
+        machine=part("machine", MachineFile, machine_of),
+        battery=battery,
+        soc_start=soc.start,
+        soc_end=soc.start if soc.end is None else soc.end,
+        coupling=_coupling(data.coupling),
+        functions=frozenset(data.functions),
+        gear="cycle",
+        contents=contents,
+        files=tuple(files),
+    )
+    return car.with_free_gear() if data.gear == "free" else car
+
+
+def sorted_changes(
+    changes: Mapping[str, Any],
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """Changes of the architecture's own keys, and component -> changes in its file."""
+    own: dict[str, Any] = {}
+    of_parts: dict[str, dict[str, Any]] = {key: {} for key in COMPONENTS}
+    for key, value in changes.items():
+        first, _, rest = key.partition(".")
+        if first in of_parts and rest:
+            of_parts[first][rest] = value
+        else:
+            own[key] = value
+    return own, of_parts
+
+
+class ComponentContents(NamedTuple):
+    """A component as an architecture has it: its file, its keys and values, and how a message names the two."""
+
+    file: Path
+    contents: dict[str, Any]
+    place: str
+
+
+def component_contents(
+    path: Path, key: str, component: str | dict[str, Any], changes: Mapping[str, Any]
+) -> ComponentContents:
+    """The file that an architecture's key names, and its contents with what replaces them."""
+    name = component if isinstance(component, str) else component["file"]
+    beside = path.parent if is_path(name, ".toml") else path.parent / "components"
+    folder = beside if beside.is_dir() else shipped_folder("architectures") / "components"
+
+    def fits(stem: str) -> bool:
+        """Whether a file's name, such as engine_x or my_engine, tells of no other kind of component."""
+        return key in stem or not any(other in stem for other in COMPONENTS)
+
+    try:
+        found = find("architectures/components", name, ".toml", beside=folder, fits=fits)
+    except DataError as error:
+        raise DataError(f"{path}, {key}: {error}") from None
+    table, place = read_contents(found), str(found)
+    own = {} if isinstance(component, str) else {k: v for k, v in component.items() if k != "file"}
+    if own:
+        table = merged(table, own)
+        place = f"{_place(place, [f'{key}.{name}' for name in own])} in {path}"
+    place = _place(place, [f"{key}.{name}" for name in changes])
+    return ComponentContents(found, with_changes(table, changes, within=f"{key}."), place)
+
+
+def _place(place: str, changes: Iterable[str]) -> str:
+    """How a message names a file, and what was changed in it."""
+    changed = ", ".join(map(printable, changes))
+    return f"{place}, with {changed} changed" if changed else place
+
+
+def _coupling(data: CouplingFile) -> Coupling:
+    return Coupling(
+        data.kind,
+        bool(data.second_clutch),
+        data.machine_ratio or 1.0,
+        data.machine_efficiency or 1.0,
+        data.disconnects_above_speed_max,
+        data.machine_shift_fuel_g * TO_SI["_g"][1],
+    )

@@ -1,0 +1,1 @@
+"""Every fault of every file at once: what `hevopt validate` does."""

@@ -1,0 +1,269 @@
+"""Driving cycles: a CSV file of speed over time, checked and read into a frozen type.
+
+Columns: `time_s`; one of `speed_mps`, `speed_kmh`, `speed_mph`; optional `gear` (0 neutral), `clutch_open`
+(0 or 1), `grade` (rise / run). Row k of gear, clutch and grade holds from its time to the next.
+Lines that begin with # are comments.
+"""
+
+import csv
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError, Fault
+from hevopt.files.lookup import find, read_text, shipped_names
+from hevopt.files.shown import printable, shown
+from hevopt.units import TO_SI
+
+_SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
+COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
+_MEGABYTES_MAX = 50
+SAMPLES_MAX = 200_000
+_TIME_MAX_S = 1e9
+SPEED_MAX_MPS = 100.0
+GRADE_MAX = 0.5
+_STEP_MIN_S, _STEP_MAX_S = 1e-4, 3600.0
+# Twice the friction limit of a dry road: nothing on tyres does more.
+_ACCELERATION_MAX_MPS2 = 20.0
+# Figures per distance say nothing below this.
+DISTANCE_MIN_M = 1.0
+# For a log or another tool's cycle given where one of our own is expected.
+IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
+_OTHERS = (".xls", ".xlsx", ".mat", ".vdri", ".tsv")
+# Called with every fault found: line and text.
+_Tell = Callable[[int, str], None]
+# Plainer than Python's own: no underscores, no digits of other scripts.
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cycle:
+    """A speed trace. `gear` and `clutch_open` are None where the file lists none.
+
+    time_s, speed_mps: (sample,)
+    gear: (sample,) 0 neutral; clutch_open: (sample,) bool; grade: (sample,) rise / run
+    source: the file it was read from, None for a trace that came from none
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+    grade: NDArray[np.float64]
+    gear: NDArray[np.int64] | None = None
+    clutch_open: NDArray[np.bool_] | None = None
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        for field in ("time_s", "speed_mps", "grade", "gear", "clutch_open"):
+            values = getattr(self, field)
+            if values is not None:
+                values = np.array(values)
+                values.flags.writeable = False
+                object.__setattr__(self, field, values)
+
+    @property
+    def distance_m(self) -> float:
+        """Distance driven, by the trapezoidal rule."""
+        return float(np.sum(np.diff(self.time_s) * (self.speed_mps[1:] + self.speed_mps[:-1]) / 2))
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last sample."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+
+def load_cycle(name: str | Path) -> Cycle:
+    """The cycle of a shipped name (`nedc`) or a CSV file's path; DataError names line and value."""
+    if Path(name).suffix.lower() in _OTHERS and os.path.exists(name):
+        raise DataError(f"{printable(str(name))}: not a cycle file, NAME.csv; {IMPORT}")
+    known = Path(name).suffix and os.path.isfile(name)
+    path = Path(name) if known else find("cycles", name, ".csv")
+    return cycle_of(path, _text(path))
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text(path, _MEGABYTES_MAX)
+    except DataError as error:
+        if isinstance(error.__context__, UnicodeDecodeError):
+            raise DataError(f"{error}; {IMPORT}") from None
+        raise
+
+
+def shipped_cycles() -> list[Cycle]:
+    """Every shipped cycle, by name."""
+    return [load_cycle(name) for name in shipped_names("cycles", ".csv")]
+
+
+def cycle_of(path: Path, text: str) -> Cycle:
+    """The cycle that the text of a cycle file holds; the path gives its name and stands in messages."""
+
+    def refuse(line: int, fault: str) -> None:
+        raise DataError(f"{path}, line {line}: {fault}")
+
+    return _cycle(path, text, refuse)
+
+
+def faults_in(path: Path) -> list[Fault | str]:
+    """Every faulty line of a cycle file, or else what is wrong with the whole of it."""
+    faults: list[tuple[int, str]] = []
+    text = _text(path)
+    try:
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # numbers out of range are among the faults
+            _cycle(path, text, lambda *fault: faults.append(fault))
+    except DataError as error:
+        if not faults:
+            return [str(error)]
+    return [Fault(f"{path}, line {line}", text) for line, text in sorted(faults)]
+
+
+def _cycle(path: Path, text: str, tell: _Tell) -> Cycle:
+    header, rows = _rows(path, text, tell)
+    columns = {name: np.array([row[i] for _, row in rows]) for i, name in enumerate(header)}
+    lines = [line for line, _ in rows]
+    speed_column = next(c for c in _SPEED_COLUMNS if c in columns)
+    factor = TO_SI.get(speed_column.removeprefix("speed"), ("", 1.0))[1]
+    speed_mps = columns[speed_column] * factor
+    grade = columns.get("grade", np.zeros(len(rows)))
+    _check_time_and_speed(lines, columns["time_s"], speed_mps, speed_column, factor, tell)
+    _check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell)
+    gear = clutch_open = None
+    if "gear" in columns:
+        gear = _whole_numbers(lines, "gear", columns["gear"], 20, tell)
+        clutch = columns.get("clutch_open", np.zeros(len(rows)))
+        clutch_open = _whole_numbers(lines, "clutch_open", clutch, 1, tell).astype(bool)
+    cycle = Cycle(
+        printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open, path
+    )
+    if cycle.distance_m < DISTANCE_MIN_M:
+        raise DataError(
+            f"{path}: distance {cycle.distance_m:.3g} m; a cycle must cover {DISTANCE_MIN_M:g} m or "
+            "more; check the column's unit"
+        )
+    return cycle
+
+
+def _rows(path: Path, text: str, tell: _Tell) -> tuple[list[str], list[tuple[int, list[float]]]]:
+    """Header names and the numbers of every good data line, with its line number."""
+    header: list[str] | None = None
+    rows: list[tuple[int, list[float]]] = []
+    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            cells = [cell.strip() for cell in next(csv.reader([line], strict=True))]
+        except csv.Error as error:
+            tell(number, f"not a CSV line ({error})")
+            continue
+        if header is None:
+            header = _checked_header(path, number, cells)
+            continue
+        if len(cells) != len(header):
+            tell(number, f"{len(cells)} values, the header has {len(header)}")
+            continue
+        if len(rows) == SAMPLES_MAX:
+            tell(
+                number,
+                f"more than the {SAMPLES_MAX} data lines allowed; shorten the cycle or use longer time "
+                "steps",
+            )
+            break
+        values = [_number(number, *pair, tell) for pair in zip(header, cells, strict=True)]
+        if None not in values:
+            rows.append((number, values))
+    if header is None:
+        raise DataError(f"{path}: empty; expected a header line such as time_s,speed_kmh")
+    if len(rows) < 2:
+        raise DataError(f"{path}: {len(rows)} data lines; a cycle needs at least 2")
+    return header, rows
+
+
+def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
+    unknown = [cell for cell in cells if cell not in COLUMNS]
+    if unknown:
+        close = get_close_matches(unknown[0].lower(), COLUMNS, n=2, cutoff=0.7)
+        hint = f"close matches: {', '.join(close)}; " if close else ""
+        raise DataError(
+            f"{path}, line {number}: unknown column {shown(unknown[0])}; {hint}"
+            f"allowed: {', '.join(COLUMNS)}; {IMPORT}"
+        )
+    if len(set(cells)) != len(cells):
+        twice = next(cell for cell in cells if cells.count(cell) > 1)
+        raise DataError(f"{path}, line {number}: column {twice} stands twice; remove one")
+    speeds = [cell for cell in cells if cell in _SPEED_COLUMNS]
+    if "time_s" not in cells or len(speeds) != 1:
+        raise DataError(
+            f"{path}, line {number}: found columns {', '.join(cells)}; needed: time_s and exactly "
+            f"one of {', '.join(_SPEED_COLUMNS)}; {IMPORT}"
+        )
+    if "clutch_open" in cells and "gear" not in cells:
+        raise DataError(f"{path}, line {number}: clutch_open without gear; add the column gear")
+    return cells
+
+
+def _number(line: int, column: str, cell: str, tell: _Tell) -> float | None:
+    if not _NUMBER.fullmatch(cell):
+        tell(
+            line,
+            f"{column} is {shown(cell)}, not a number; a finite number such as 12.5 is needed",
+        )
+        return None
+    value = float(cell)
+    if not np.isfinite(value):
+        tell(line, f"{column} is {shown(cell)}; a finite number is needed")
+        return None
+    return value
+
+
+def _check_time_and_speed(lines, time_s, speed_mps, column, factor, tell: _Tell) -> None:
+    _check_range(lines, "time_s", time_s, -_TIME_MAX_S, _TIME_MAX_S, tell)
+    steps_s = np.diff(time_s)
+    for k in np.flatnonzero(steps_s <= 0) + 1:
+        tell(
+            lines[k],
+            f"time {time_s[k]:g} s after {time_s[k - 1]:g} s; time must increase from line to line; "
+            "sort the lines or remove the duplicate",
+        )
+    for k in (
+        np.flatnonzero((steps_s > 0) & ((steps_s < _STEP_MIN_S) | (steps_s > _STEP_MAX_S))) + 1
+    ):
+        tell(
+            lines[k],
+            f"{steps_s[k - 1]:g} s after the line before; allowed: {_STEP_MIN_S:g} to {_STEP_MAX_S:g} s; "
+            "time is in seconds",
+        )
+    outside = (speed_mps < 0) | (speed_mps > SPEED_MAX_MPS)
+    for k in np.flatnonzero(outside):
+        tell(
+            lines[k],
+            f"{column} is {speed_mps[k] / factor:g}; allowed: 0 to {SPEED_MAX_MPS / factor:g}; check the "
+            "unit in the column's name",
+        )
+    judged = (steps_s > 0) & ~outside[1:] & ~outside[:-1]
+    acceleration = np.diff(speed_mps) / np.where(judged, steps_s, 1.0)
+    for k in np.flatnonzero(judged & (np.abs(acceleration) > _ACCELERATION_MAX_MPS2)) + 1:
+        tell(
+            lines[k],
+            f"acceleration {acceleration[k - 1]:.3g} m/s²; allowed: ±{_ACCELERATION_MAX_MPS2:g} m/s², more "
+            "than tyres hold; check the units of time and speed, or repair the spike",
+        )
+
+
+def _check_range(lines, column, values, low, high, tell: _Tell) -> None:
+    for k in np.flatnonzero((values < low) | (values > high)):
+        tell(lines[k], f"{column} is {values[k]:g}; allowed: {low:g} to {high:g}")
+
+
+def _whole_numbers(lines, column, values, high, tell: _Tell) -> NDArray[np.int64]:
+    _check_range(lines, column, values, 0, high, tell)
+    for k in np.flatnonzero(values != np.round(values)):
+        tell(lines[k], f"{column} is {values[k]:g}; a whole number is needed")
+    return np.clip(np.round(values), 0, high).astype(np.int64)

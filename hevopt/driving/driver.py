@@ -1,0 +1,61 @@
+"""What the driver does where the engine alone lacks torque: changes down, or slips the clutch at higher speed.
+
+Both depend on the engine alone, so that every architecture drives the same gears. Listed gears are kept.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.car.engine import Engine, full_load_torque_nm
+from hevopt.car.transmission import Gearbox, input_torque_nm
+from hevopt.car.vehicle import Vehicle
+from hevopt.driving.demand import Demand
+
+Array = NDArray[np.float64]
+# Changing down stops here, short of the engine's highest speed.
+_SPEED_SHARE_MAX = 0.9
+# The electric load counts at the crankshaft through an alternator no better than this.
+_ALTERNATOR_EFFICIENCY_MIN = 0.5
+
+
+def change_down(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbox) -> Demand:
+    """The demand in lower gears at the steps where the engine could not hold the listed gear."""
+    gear = demand.gear.copy()
+    for _ in range(len(gearbox.ratios) - 2):
+        speed, need = _engine_speed_and_need(demand, gear, engine, gearbox)
+        need = need + vehicle.auxiliary_power_w / _ALTERNATOR_EFFICIENCY_MIN / speed
+        short = (gear > 1) & (need > full_load_torque_nm(engine, speed))
+        lower = np.maximum(gear - 1, 1)
+        lower_speed = gearbox.ratios[lower] * demand.wheel_speed_radps
+        short &= lower_speed <= _SPEED_SHARE_MAX * engine.speed_max_radps
+        if not short.any():
+            break
+        gear = np.where(short, lower, gear)
+    return demand.with_gear(gear)
+
+
+def launch_speed_radps(demand: Demand, engine: Engine, gearbox: Gearbox) -> Array:
+    """(time,) lowest engine speed, idle or above, at which first gear's clutch can pass the demand.
+
+    Idle unless a hard launch needs more torque than full load at idle speed gives; 10 % are kept for the
+    electric load.
+    """
+    _, need = _engine_speed_and_need(demand, demand.gear, engine, gearbox)
+    rising = engine.full_load_speed_radps[: int(np.argmax(engine.full_load_torque_nm)) + 1]
+    torque = np.maximum.accumulate(engine.full_load_torque_nm[: len(rising)])
+    needed = np.interp(1.1 * need, torque, rising) if len(rising) > 1 else np.zeros_like(need)
+    launching = (demand.gear == 1) & (demand.wheel_torque_nm > 0)
+    return np.where(launching, np.maximum(needed, engine.idle_radps), engine.idle_radps)
+
+
+def _engine_speed_and_need(
+    demand: Demand, gear: NDArray[np.int64], engine: Engine, gearbox: Gearbox
+) -> tuple[Array, Array]:
+    """(time,) engine speed and the torque it must give alone, in a gear; 0 torque in neutral."""
+    ratio, efficiency = gearbox.ratios[gear], gearbox.efficiency[gear]
+    input_speed = ratio * demand.wheel_speed_radps
+    inertia = np.where(
+        input_speed >= engine.idle_radps, engine.inertia_kgm2 * ratio * demand.wheel_accel_radps2, 0
+    )
+    need = input_torque_nm(demand.wheel_torque_nm, ratio, efficiency) + inertia
+    return np.maximum(input_speed, engine.idle_radps), np.where(gear > 0, need, 0.0)

@@ -1,0 +1,1 @@
+"""Finding, reading, quoting and writing files, whatever they hold."""

@@ -1,0 +1,1 @@
+"""Coast-down runs to a road load."""

@@ -1,0 +1,1 @@
+"""Logged drives to cycles of even steps."""

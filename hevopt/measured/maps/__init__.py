@@ -1,0 +1,1 @@
+"""Points of a test bench to maps of engines and machines."""

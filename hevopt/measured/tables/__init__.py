@@ -1,0 +1,1 @@
+"""Tables of any shape to columns with names and units."""

@@ -1,0 +1,129 @@
+"""What a trajectory does: modes of operation, spells of engine on and off, limits touched."""
+
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.car.architecture import Architecture
+from hevopt.car.engine import EngineGrid, full_load_torque_nm
+from hevopt.car.machine import torque_limit_nm
+from hevopt.pages.comparison.results import Share
+from hevopt.problem.problem import Problem, Trajectory
+from hevopt.problem.table import ControlTable
+
+Array = NDArray[np.float64]
+
+OPERATIONS = (
+    "standing, engine off",
+    "standing, engine on",
+    "braking, recovering",
+    "braking, not recovering",
+    "electric driving",
+    "engine alone",
+    "engine, machine assists",
+    "engine, charging",
+)
+# A machine or battery power of less than this is none.
+_POWER_MIN_W = 1.0
+_NEAR = 0.01
+_WINDOW_NEAR = 0.002
+
+
+def operations_of(trajectory: Trajectory, table: ControlTable) -> NDArray[np.int64]:
+    """(time,) index into OPERATIONS.
+
+    Standing: no speed. Braking: the wheels give power; recovering: the battery takes some. Driving: electric
+    without fuel; else by what the machine does: assists, or charges the battery, or neither.
+    """
+    f, power = trajectory.flows, trajectory.battery_power_w
+    standing, braking = table.signals.speed_mps == 0, f["wheel_power_w"] < 0
+    machine = f["machine_torque_nm"] * f["machine_speed_radps"]
+    tests = [
+        standing & ~engine_on(trajectory, table),
+        standing,
+        braking & (power < -_POWER_MIN_W),
+        braking,
+        f["fuel_power_w"] == 0,
+        (machine <= _POWER_MIN_W) & (power >= -_POWER_MIN_W),
+        machine > _POWER_MIN_W,
+    ]
+    return np.select(tests, np.arange(len(tests)), len(tests))
+
+
+def engine_on(trajectory: Trajectory, table: ControlTable) -> NDArray[np.bool_]:
+    """(time,) whether the engine turns, with or without fuel."""
+    return np.array([table.controls[c].engine_on for c in trajectory.control])
+
+
+def shares_of(
+    trajectory: Trajectory, table: ControlTable, operation: NDArray, *, nox_known: bool
+) -> list[Share]:
+    """Time, distance, fuel and NOx of every mode of operation that occurs."""
+    distance = table.signals.speed_mps * table.step_s
+    return [
+        Share(
+            operation=name,
+            time_s=float(np.sum(table.step_s[here])),
+            distance_m=float(np.sum(distance[here])),
+            fuel_kg=float(np.sum(trajectory.fuel_kg[here])),
+            nox_kg=float(np.sum(trajectory.nox_kg[here])) if nox_known else None,
+        )
+        for code, name in enumerate(OPERATIONS)
+        if (here := operation == code).any()
+    ]
+
+
+def spells_s(on: NDArray[np.bool_], step_s: Array) -> tuple[list[float], list[float]]:
+    """Lengths of the spells of true and of false, in their order."""
+    lengths: dict[bool, list[float]] = {True: [], False: []}
+    for state, steps in groupby(zip(on.tolist(), step_s.tolist(), strict=True), lambda s: s[0]):
+        lengths[state].append(sum(step for _, step in steps))
+    return lengths[True], lengths[False]
+
+
+def limits_touched(car: Architecture, problem: Problem, trajectory: Trajectory) -> dict[str, int]:
+    """Name of a limit -> steps that end within 1 % of it, or of the SOC window's width 0.2 %."""
+    f, pack = trajectory.flows, problem.battery
+    torque, speed = f["engine_torque_nm"], f["engine_speed_radps"]
+    fired = f["fuel_power_w"] > 0
+    machine_torque, machine_speed = f["machine_torque_nm"], f["machine_speed_radps"]
+    limit = torque_limit_nm(car.machine, machine_speed)
+    current = f["battery_current_a"]
+    width = _WINDOW_NEAR * (pack.soc_max - pack.soc_min)
+    low, high = (
+        trajectory.soc[1:] <= pack.soc_min + width,
+        trajectory.soc[1:] >= pack.soc_max - width,
+    )
+    near = {
+        "engine full load": fired & (torque >= (1 - _NEAR) * full_load_torque_nm(car.engine, speed)),
+        "engine top speed": speed >= (1 - _NEAR) * car.engine.speed_max_radps,
+        "edge of the engine map": fired & _near_grid_edge(car, torque, speed),
+        "machine torque or power": (np.abs(machine_torque) >= (1 - _NEAR) * limit)
+        & (np.abs(machine_torque) > 0),
+        "machine top speed": machine_speed >= (1 - _NEAR) * car.machine.speed_max_radps,
+        "battery power": _near_battery_limit(problem, trajectory.battery_power_w, current),
+        "SOC window": low | high,
+    }  # fmt: skip
+    return {name: int(np.sum(steps)) for name, steps in near.items() if steps.any()}
+
+
+def _near_grid_edge(car: Architecture, torque: Array, speed: Array) -> NDArray[np.bool_]:
+    grid = car.engine.fuel
+    if not isinstance(grid, EngineGrid):
+        return np.zeros(len(torque), dtype=bool)
+    near = np.zeros(len(torque), dtype=bool)
+    for value, axis in ((torque, grid.torque_nm), (speed, grid.speed_radps)):
+        margin = _NEAR * (axis[-1] - axis[0])
+        near |= (value <= axis[0] + margin) | (value >= axis[-1] - margin)
+    return near
+
+
+def _near_battery_limit(problem: Problem, power: Array, current: Array) -> NDArray[np.bool_]:
+    pack, share = problem.battery, 1 - _NEAR
+    return (
+        (power >= share * pack.power_max_discharge_w)
+        | (-power >= share * pack.power_max_charge_w)
+        | (current >= share * pack.current_max_discharge_a)
+        | (-current >= share * pack.current_max_charge_a)
+    )

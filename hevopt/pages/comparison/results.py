@@ -1,0 +1,267 @@
+"""The saved form of a comparison: JSON, compressed with gzip, from which its page can be made again.
+
+Rows hold every figure at full precision; traces and maps are rounded, see `collect.py`.
+"""
+
+import gzip
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, InstanceOf, PlainSerializer
+
+from hevopt.bounds.certificate import Claim
+from hevopt.files.lookup import dumped_json
+from hevopt.files.toml import FileModel
+from hevopt.studies.status import Status
+
+FORMAT = "hevopt comparison 2"
+# Far beyond any figure, and far from where sums and squares of floats end.
+_NUMBER_MAX = 1e100
+Number = Annotated[float, Field(ge=-_NUMBER_MAX, le=_NUMBER_MAX)]
+Whole = Annotated[int, Field(ge=-(2**53), le=2**53)]
+# Text in JSON.
+SavedStatus = Annotated[InstanceOf[Status], BeforeValidator(Status.read), PlainSerializer(str)]
+SavedClaim = Annotated[InstanceOf[Claim], BeforeValidator(Claim.read), PlainSerializer(str)]
+
+
+class RowFigures(FileModel):
+    """The figures of `rows.Row`."""
+
+    architecture: str
+    strategy: str
+    status: SavedStatus
+    fuel_l_per_100km: Number | None
+    delta_fuel_percent: Number | None
+    co2_g_per_km: Number | None
+    nox_mg_per_km: Number | None
+    delta_nox_percent: Number | None
+    soc_start: Number | None
+    soc_end: Number | None
+    delta_energy_percent: Number | None
+    fuel_corrected_l_per_100km: Number | None
+    engine_starts: Whole | None
+    bound_l_per_100km: Number | None
+    gap_percent: Number | None
+    certificate: SavedClaim | None
+    solve_s: Number | None
+
+
+class MapFigures(FileModel):
+    """A component over (speed, torque); None where it cannot be used or the figure has no meaning.
+
+    efficiency: of the engine, or of the machine in the direction of its power
+    nox_kgpj: NOx per work, of engines only; limit_nm: largest torque over speed; least_nm: lowest,
+    None beyond a measured engine map's speeds
+    """
+
+    name: str
+    speed_radps: list[Number]
+    torque_nm: list[Number]
+    efficiency: list[list[Number | None]]
+    nox_kgpj: list[list[Number | None]] | None
+    limit_nm: list[Number]
+    least_nm: list[Number | None]
+
+
+class CarFigures(FileModel):
+    """What the rows of one architecture share; lists are (time,).
+
+    price_kgpj: what a joule of end charge is worth, from the certificate; certified_gap_percent: how far dynamic
+    programming's rollout lies above the bound, the certificate's own looseness at most
+    """
+
+    name: str
+    time_s: list[Number]
+    step_s: list[Number]
+    speed_mps: list[Number]
+    wheel_power_w: list[Number]
+    missing_torque_nm: list[Number]
+    soc_min: Number
+    soc_max: Number
+    heating_value_jpkg: Number
+    price_kgpj: Number
+    certified_gap_percent: Number | None
+    engine: MapFigures
+    machine: MapFigures
+
+
+class Trace(FileModel):
+    """What a row does, (time,), but soc: (time + 1,). operation: index into the names of `operations`."""
+
+    soc: list[Number]
+    operation: list[Whole]
+    engine_gear: list[Whole]
+    machine_gear: list[Whole]
+    fuel_kg: list[Number]
+    nox_kg: list[Number]
+    battery_power_w: list[Number]
+    engine_torque_nm: list[Number]
+    engine_speed_radps: list[Number]
+    machine_torque_nm: list[Number]
+    machine_speed_radps: list[Number]
+
+
+class Link(FileModel):
+    """Energy that goes from one place to another over the whole cycle."""
+
+    source: str
+    target: str
+    energy_j: Number
+
+
+class Item(FileModel):
+    """One entry of the energy balance."""
+
+    name: str
+    energy_j: Number
+
+
+class Energy(FileModel):
+    """Where the energy of a cycle comes from and where it stays: sum(taken) = sum(spent) + residual_j.
+
+    links: the same, and what flows in between; of_which: shares of entries, for reading, in no sum
+    """
+
+    links: list[Link]
+    taken: list[Item]
+    spent: list[Item]
+    residual_j: Number
+    of_which: list[Item]
+
+
+class Share(FileModel):
+    """What one mode of operation takes of a cycle; NOx None where the engine has no data on it."""
+
+    operation: str
+    time_s: Number
+    distance_m: Number
+    fuel_kg: Number
+    nox_kg: Number | None
+
+
+class Member(FileModel):
+    """One member of a rule family: thresholds, and what comes of them; NOx None where it is not known.
+
+    neutral: keeps the SOC window, and its end charge is that asked within 1 % of the fuel's energy, as of rows
+    """
+
+    threshold_w: Number
+    nox_cap_kgps: Number | None = None
+    corrected_l_per_100km: Number
+    nox_mg_per_km: Number | None
+    surplus_j: Number
+    neutral: bool
+    chosen: bool
+
+
+class Detail(FileModel):
+    """All of a row beyond its figures. limits: name of a limit -> steps within 1 % of it.
+
+    engine_on_s, engine_off_s: lengths of the spells; equivalence_kgpj: the strategy's own price, if it has one
+    solver: what a solver reports as trouble
+    """
+
+    trace: Trace
+    energy: Energy
+    shares: list[Share]
+    limits: dict[str, Whole]
+    engine_on_s: list[Number]
+    engine_off_s: list[Number]
+    equivalence_kgpj: Number | None
+    calibration: list[Member]
+    solver: list[str]
+
+
+class Row(FileModel):
+    """A row with its detail; None where the case failed."""
+
+    figures: RowFigures
+    detail: Detail | None
+
+
+class PublishedFigure(FileModel):
+    """One published statement, ours beside it, and what differs."""
+
+    what: str
+    published: str
+    ours: str
+    differs: str
+
+
+class ParetoPoint(FileModel):
+    """A plan on the front, with the weights on NOx for which none found is better; see `figures_of`."""
+
+    nox_weight: Number
+    nox_weights: list[Number]
+    strategy: str
+    fuel_l_per_100km: Number
+    nox_mg_per_km: Number
+    bound_l_per_100km: Number
+    gap_percent: Number | None
+    certificate: str
+
+
+class Corner(FileModel):
+    """A corner of the outer front."""
+
+    nox_mg_per_km: Number
+    fuel_l_per_100km: Number
+
+
+class ParetoFront(FileModel):
+    """The front of one architecture: plans from least fuel to least NOx, and the proven outer front."""
+
+    architecture: str
+    cycle: str
+    points: list[ParetoPoint]
+    outer: list[Corner]
+    gap_percent: Number
+
+
+class Sensitivity(FileModel):
+    """How a result moves with one parameter; see `sensitivity.Effect`. reasons: none in older files."""
+
+    architecture: str
+    strategy: str
+    parameter: str
+    unit: str
+    values: list[Number]
+    fuel_l_per_100km: list[Number | None]
+    delta_percent: list[Number | None]
+    nox_mg_per_km: list[Number | None]
+    delta_nox_percent: list[Number | None]
+    elasticity: Number | None
+    elasticity_nox: Number | None
+    reasons: list[str | None] | None = None
+
+
+class Results(FileModel):
+    """A comparison as it is saved.
+
+    changes: what of the cars' files was changed, line by line
+    end_asked: car -> state of charge asked at the end, where it is another than the start's
+    inputs: file -> SHA-256; versions: name -> version; failures: architecture, or it and strategy -> message
+    """
+
+    format: Literal["hevopt comparison 2"] = FORMAT
+    cycle: str
+    distance_m: Number
+    reference: str | None
+    nox_weight: Number
+    free_gear: bool
+    end_asked: dict[str, Number]
+    command: str
+    changes: list[str]
+    inputs: dict[str, str]
+    versions: dict[str, str]
+    operations: list[str]
+    causal: list[str]
+    cars: dict[str, CarFigures]
+    rows: list[Row]
+    failures: dict[str, str]
+    published: list[PublishedFigure]
+    pareto: list[ParetoFront] | None = None
+    sensitivity: list[Sensitivity] | None = None
+
+    def packed(self) -> bytes:
+        """The contents of the file; the same results give the same bytes."""
+        return gzip.compress(dumped_json(self.model_dump()).encode(), compresslevel=6, mtime=0)

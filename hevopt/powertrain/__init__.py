@@ -1,0 +1,1 @@
+"""The backward evaluator: a car on a cycle to the table of every control at every step."""

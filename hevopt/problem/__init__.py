@@ -1,0 +1,1 @@
+"""The waist: control table, battery, problem, plan, and the one judge that drives a plan."""

@@ -1,0 +1,43 @@
+"""What flows through the parts of a car, by name: of every control at every step, or of one plan."""
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hevopt.problem.frozen import frozen
+
+Array = NDArray[np.float64]
+
+
+class Flows(Mapping[str, Array]):
+    """name -> (time, control) powers, speeds and torques."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def along(self, control: NDArray[np.int64]) -> dict[str, Array]:
+        """name -> (time,) of one control per step."""
+
+
+class GivenFlows(Flows):
+    """Arrays as they were given, copied so that nobody can change them."""
+
+    __slots__ = ("_flows",)
+
+    def __init__(self, flows: Mapping[str, ArrayLike], place: str = "") -> None:
+        self._flows = {name: frozen(f"{place}flows {name}", flow) for name, flow in flows.items()}
+
+    def __getitem__(self, name: str) -> Array:
+        return self._flows[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._flows)
+
+    def __len__(self) -> int:
+        return len(self._flows)
+
+    def along(self, control: NDArray[np.int64]) -> dict[str, Array]:
+        steps = np.arange(len(control))
+        return {name: flow[steps, control] for name, flow in self._flows.items()}

@@ -1,0 +1,125 @@
+"""The waist: what a strategy sees of a car and a cycle, and what it gives back.
+
+The powertrain is evaluated once for every step and every control; after that no strategy needs a car.
+Axis order is (time, control). Power > 0 flows towards the wheels; battery power > 0 discharges.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.problem.battery import Battery, energy_j, within_limits
+from hevopt.problem.table import Array, ControlTable, Reject
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A control table, a battery and what is asked: least fuel + nox_weight x NOx, with enough charge left.
+
+    soc_end_min: state of charge that must at least be left at the end
+    start_mode: mode before the first step
+    nox_weight: kg of fuel that a kg of NOx counts
+    cost_kg: (time, control) what a step counts: fuel plus weighted NOx
+    start_j, end_min_j, window_j: stored energy before the first step, least at the end, at the window's ends
+    A control whose power the battery cannot deliver or take at every state of charge of its window is rejected.
+    """
+
+    table: ControlTable
+    battery: Battery
+    soc_start: float
+    soc_end_min: float
+    start_mode: int = 0
+    nox_weight: float = 0.0
+    cost_kg: Array = field(init=False)
+    start_j: float = field(init=False)
+    end_min_j: float = field(init=False)
+    window_j: tuple[float, float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        low, high = self.battery.soc_min, self.battery.soc_max
+        for name in ("soc_start", "soc_end_min"):
+            if not low <= getattr(self, name) <= high:
+                raise DataError(
+                    f"{name} {getattr(self, name):g} lies outside the SOC window; allowed: "
+                    f"{low:g} to {high:g}"
+                )
+        if not (np.isfinite(self.nox_weight) and 0 <= self.nox_weight <= 1e6):
+            raise DataError(f"nox_weight {self.nox_weight}; allowed: 0 to 1e6 kg fuel per kg NOx")
+        if not 0 <= self.start_mode < len(self.table.switch_fuel_kg):
+            raise DataError(
+                f"start_mode {self.start_mode}; allowed: 0 to {len(self.table.switch_fuel_kg) - 1}"
+            )
+        beyond = ~within_limits(self.battery, self.table.battery_power_w)
+        if (self.table.feasible & beyond).any():
+            bits = np.where(beyond, np.uint16(Reject.BATTERY_LIMIT), np.uint16(0))
+            table = replace(self.table, reject=self.table.reject | bits)
+            object.__setattr__(self, "table", table)
+        self._derive()
+
+    def _derive(self) -> None:
+        cost_kg = self.table.fuel_kg
+        if self.nox_weight != 0:
+            cost_kg = cost_kg + self.nox_weight * self.table.nox_kg
+            cost_kg.flags.writeable = False
+        socs = np.array(
+            [self.soc_start, self.soc_end_min, self.battery.soc_min, self.battery.soc_max]
+        )
+        start, end, low, high = map(float, energy_j(self.battery, socs))
+        for name, value in (
+            ("cost_kg", cost_kg), ("start_j", start), ("end_min_j", end), ("window_j", (low, high)),
+        ):  # fmt: skip
+            object.__setattr__(self, name, value)
+
+    def with_nox_weight(self, nox_weight: float) -> "Problem":
+        """The same problem with another objective."""
+        return replace(self, nox_weight=nox_weight)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A strategy's proposal. control: (time,) indices into the table; notes: what the solver can tell."""
+
+    control: NDArray[np.int64]
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """What a plan does, added up by simulate.
+
+    energy_j, soc: (time + 1,), stored energy and state of charge at the steps' ends
+    mode, fuel_kg, nox_kg, battery_power_w: (time,); fuel includes the cost of switching in its step
+    flows: name -> (time,) powers, speeds, torques and losses
+    residuals: component -> (time,) power balance, in W, 0 up to rounding
+    """
+
+    control: NDArray[np.int64]
+    energy_j: Array
+    soc: Array
+    mode: NDArray[np.int64]
+    fuel_kg: Array
+    switch_fuel_kg: Array
+    nox_kg: Array
+    battery_power_w: Array
+    cost_kg: float
+    flows: Mapping[str, Array]
+    residuals: Mapping[str, Array]
+
+    @property
+    def total_fuel_kg(self) -> float:
+        """Fuel burnt, starts and shifts included."""
+        return float(np.sum(self.fuel_kg))
+
+    @property
+    def total_nox_kg(self) -> float:
+        """NOx emitted."""
+        return float(np.sum(self.nox_kg))
+
+    @property
+    def end_j(self) -> float:
+        """Stored energy left."""
+        return float(self.energy_j[-1])

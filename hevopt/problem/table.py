@@ -1,0 +1,246 @@
+"""Carried out of hevopt/problem.py."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from enum import IntFlag
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError
+from hevopt.problem.flows import Flows, GivenFlows
+from hevopt.problem.frozen import frozen
+
+Array = NDArray[np.float64]
+
+
+_MODES_MAX = 1000
+
+
+class Reject(IntFlag):
+    """Why a control cannot be used at a step."""
+
+    ENGINE_TORQUE = 1
+    ENGINE_SPEED = 2
+    ENGINE_MAP = 4
+    MACHINE_LIMIT = 8
+    MACHINE_SPEED = 16
+    BATTERY_LIMIT = 32
+    NO_PATH = 64
+    FUNCTION = 128
+    DUPLICATE = 256
+    GIVEN = 512
+    MACHINE_MAP = 1024
+
+
+REJECT_WORDS: dict[Reject, str] = {
+    Reject.ENGINE_TORQUE: "engine torque",
+    Reject.ENGINE_SPEED: "engine speed",
+    Reject.ENGINE_MAP: "outside the engine map",
+    Reject.MACHINE_LIMIT: "machine torque or power",
+    Reject.MACHINE_SPEED: "machine speed",
+    Reject.BATTERY_LIMIT: "battery limit",
+    Reject.NO_PATH: "torque does not reach the wheels",
+    Reject.FUNCTION: "function not in the architecture",
+    Reject.DUPLICATE: "same as another control",
+    Reject.GIVEN: "marked as not feasible",
+    Reject.MACHINE_MAP: "outside the machine map",
+}
+
+
+class Control(NamedTuple):
+    """Label of a control: engine turning or not, the machine's gear (0 where it has none), torque level, and
+    the engine's gear where it is a choice (0 where the cycle gives it)."""
+
+    engine_on: bool
+    machine_gear: int
+    level: str
+    engine_gear: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signals:
+    """What a rule may look at, all (time,): the driver's view of the step."""
+
+    speed_mps: Array
+    wheel_power_w: Array
+    gear: NDArray[np.int64]
+    clutch_open: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        _freeze(self, {"gear": np.int64, "clutch_open": np.bool_}, "signals: ")
+
+    def __reduce__(self) -> tuple:
+        return type(self), tuple(getattr(self, part.name) for part in fields(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControlTable:
+    """Every control at every step. It copies what it is given, and nothing in it can be changed.
+
+    time_s, step_s: (time,) start and length of the steps
+    fuel_kg, nox_kg, battery_power_w: (time, control) per step; finite also where rejected
+    reject: (time, control) bits of Reject, 0 = feasible
+    mode: (control,) discrete state the control leads to
+    switch_fuel_kg, switch_allowed: (mode, mode) [from, to]
+    flows: name -> (time, control) powers, speeds and torques for the energy balance; may be empty
+    missing_torque_nm: (time,) wheel torque that no control could deliver and that was left undriven
+    """
+
+    time_s: Array
+    step_s: Array
+    fuel_kg: Array
+    nox_kg: Array
+    battery_power_w: Array
+    reject: NDArray[np.uint16]
+    mode: NDArray[np.int64]
+    switch_fuel_kg: Array
+    switch_allowed: NDArray[np.bool_]
+    controls: tuple[Control, ...]
+    signals: Signals | None = None
+    flows: Mapping[str, Array] = field(default_factory=dict)
+    missing_torque_nm: Array | None = None
+
+    @classmethod
+    def from_arrays(
+        cls,
+        fuel_kg: Array,
+        battery_power_w: Array,
+        feasible: NDArray[np.bool_] | None = None,
+        *,
+        step_s: float | Array = 1.0,
+        nox_kg: Array | None = None,
+        mode: NDArray[np.int64] | None = None,
+        switch_fuel_kg: Array | None = None,
+        switch_allowed: NDArray[np.bool_] | None = None,
+    ) -> "ControlTable":
+        """A table from (time, control) arrays alone: any cost in kg, battery power, and what can be used.
+
+        Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is
+        one, and nothing costs to switch; with it, `switch_fuel_kg` is (mode, mode), by default 0.
+        Raises DataError where shapes do not agree or usable entries are not finite.
+        """
+        fuel, power = frozen("fuel_kg", fuel_kg), frozen("battery_power_w", battery_power_w)
+        if fuel.ndim != 2 or power.shape != fuel.shape or not fuel.size:
+            raise DataError(
+                "fuel_kg and battery_power_w must be one shape (time, control), with a step and a control at "
+                f"least; found {fuel.shape} and {power.shape}"
+            )
+        usable = frozen("feasible", np.ones(fuel.shape) if feasible is None else feasible, np.bool_)
+        nox = np.zeros_like(fuel) if nox_kg is None else frozen("nox_kg", nox_kg)
+        if usable.shape != fuel.shape or nox.shape != fuel.shape:
+            raise DataError(f"feasible and nox_kg must have the shape of fuel_kg, {fuel.shape}")
+        steps = frozen("step_s", step_s)
+        if steps.shape not in ((), (1,), fuel.shape[:1]):
+            raise DataError(
+                f"step_s has shape {steps.shape}; allowed: one number, or one per step, {fuel.shape[:1]}"
+            )
+        steps = np.broadcast_to(steps, fuel.shape[:1])
+        modes = frozen("mode", np.zeros(fuel.shape[1]) if mode is None else mode, np.int64)
+        switch = _no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
+        switch = frozen("switch_fuel_kg", switch)
+        allowed = np.ones(switch.shape) if switch_allowed is None else switch_allowed
+        return cls(
+            time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
+            step_s=steps,
+            fuel_kg=np.where(usable, fuel, 0.0),
+            nox_kg=np.where(usable, nox, 0.0),
+            battery_power_w=np.where(usable, power, 0.0),
+            reject=np.where(usable, 0, int(Reject.GIVEN)),
+            mode=modes,
+            switch_fuel_kg=switch,
+            switch_allowed=allowed,
+            controls=tuple(Control(True, 0, str(c)) for c in range(fuel.shape[1])),
+        )
+
+    def __post_init__(self) -> None:
+        types = {"reject": np.uint16, "mode": np.int64, "switch_allowed": np.bool_}
+        _freeze(self, types, "control table: ")
+        if not isinstance(self.flows, Flows):
+            object.__setattr__(self, "flows", GivenFlows(self.flows, "control table: "))
+        object.__setattr__(self, "controls", tuple(self.controls))
+        self._check_shapes()
+        self._check_values()
+
+    def __reduce__(self) -> tuple:
+        """Copies and pickles are made by the constructor, so that they cannot be changed either."""
+        parts = {part.name: getattr(self, part.name) for part in fields(self)}
+        if isinstance(self.flows, GivenFlows):
+            parts["flows"] = dict(self.flows)
+        return type(self), tuple(parts.values())
+
+    def _check_shapes(self) -> None:
+        if self.fuel_kg.ndim != 2 or not self.fuel_kg.size:
+            raise DataError(
+                f"control table: fuel_kg has shape {self.fuel_kg.shape}, expected (time, control), with a step "
+                "and a control at least"
+            )
+        whole = steps, controls = self.fuel_kg.shape
+        modes = len(self.switch_fuel_kg) if self.switch_fuel_kg.ndim else 0
+        expected = {
+            "time_s": (steps,),
+            "step_s": (steps,),
+            "nox_kg": whole,
+            "battery_power_w": whole,
+            "reject": whole,
+            "mode": (controls,),
+            "switch_fuel_kg": (modes, modes),
+            "switch_allowed": (modes, modes),
+            "missing_torque_nm": (steps,),
+        }
+        found = {name: getattr(self, name) for name in expected}
+        if isinstance(self.flows, GivenFlows):
+            found |= {f"flows {name}": values for name, values in self.flows.items()}
+        for part in fields(Signals) if self.signals is not None else ():
+            name = f"signals.{part.name}"
+            found[name], expected[name] = getattr(self.signals, part.name), (steps,)
+        for name, values in found.items():
+            if values is not None and values.shape != expected.get(name, whole):
+                raise DataError(
+                    f"control table: {name} has shape {values.shape}, expected {expected.get(name, whole)}"
+                    " (time, control) or (mode, mode)"
+                )
+        if len(self.controls) != controls:
+            raise DataError(f"control table: {len(self.controls)} labels for {controls} controls")
+
+    def _check_values(self) -> None:
+        for name in ("step_s", "time_s", "fuel_kg", "nox_kg", "battery_power_w", "switch_fuel_kg"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise DataError(
+                    f"control table: {name} holds NaN or infinite values; give any finite value "
+                    "and mark the entry in reject or switch_allowed"
+                )
+        if (self.step_s <= 0).any():
+            raise DataError("control table: every step_s must be > 0")
+        if self.mode.min() < 0 or self.mode.max() >= len(self.switch_fuel_kg):
+            raise DataError(
+                f"control table: mode runs from {self.mode.min()} to {self.mode.max()}; allowed: 0 "
+                f"to {len(self.switch_fuel_kg) - 1}, the size of switch_fuel_kg"
+            )
+        if (self.switch_fuel_kg < 0).any():
+            raise DataError("control table: switch_fuel_kg must be >= 0")
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """(time, control) True where the control can be used."""
+        return self.reject == 0
+
+
+def _freeze(parts: Signals | ControlTable, types: Mapping[str, type], place: str) -> None:
+    """Put arrays that cannot be changed in the place of those given: of float64 but for the types named."""
+    for part in fields(parts):
+        if part.name in ("controls", "signals", "flows") or getattr(parts, part.name) is None:
+            continue
+        values = frozen(
+            place + part.name, getattr(parts, part.name), types.get(part.name, np.float64)
+        )
+        object.__setattr__(parts, part.name, values)
+
+
+def _no_switching(modes: NDArray[np.int64]) -> Array:
+    """(mode, mode) of 0 for every mode that stands in the list."""
+    highest = int(modes.max(initial=0))
+    if not 0 <= highest < _MODES_MAX:
+        raise DataError(f"mode runs to {highest}; allowed: 0 to {_MODES_MAX - 1}")
+    return np.zeros((highest + 1, highest + 1))

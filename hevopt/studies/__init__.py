@@ -1,0 +1,1 @@
+"""Cases, their rows, and the studies made of them: comparison, front, sensitivity."""

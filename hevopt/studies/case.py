@@ -1,0 +1,96 @@
+"""A case: one car on one cycle, solved by dynamic programming and certified."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+from hevopt.bounds.certificate import TARGET_GAP, Certificate, certify
+from hevopt.car.architecture import Architecture
+from hevopt.driving.cycle import Cycle
+from hevopt.errors import UnknownNoxError
+from hevopt.files.shown import printable
+from hevopt.powertrain.balance import Around
+from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_problem, torques_of
+from hevopt.problem.problem import Plan, Problem, Trajectory
+from hevopt.problem.simulation import simulate
+from hevopt.strategies import dp
+
+# Levels are added until the cost moves by less than this share.
+_REFINED_ENOUGH = 2e-4
+_REFINEMENTS_MAX = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """A car on a cycle, with the plan of dynamic programming and the certificate along its rollout."""
+
+    car: Architecture
+    cycle: Cycle
+    problem: Problem
+    certificate: Certificate
+    dp_plan: Plan
+    dp_trajectory: Trajectory
+    dp_s: float
+
+
+def prepare(
+    car: Architecture,
+    cycle: Cycle,
+    *,
+    levels: int = TORQUE_LEVELS,
+    nox_weight: float = 0.0,
+    allow_shortfall: bool = False,
+    refine: bool = False,
+) -> Case:
+    """The problem of a car on a cycle, solved by dynamic programming and certified.
+
+    Raises UnknownNoxError for a weight on NOx where the engine has no data on it.
+    refine: add torque levels around the plan, closer each time, until its cost moves by less than 0.02 %; plans
+    and certificate are then those of the table with the added levels.
+    """
+
+    def case_with(around: Around | None) -> Case:
+        problem = build_problem(
+            car,
+            cycle,
+            levels=levels,
+            nox_weight=nox_weight,
+            allow_shortfall=allow_shortfall,
+            around=around,
+        )
+        return dp_case(car, cycle, problem)
+
+    if nox_weight > 0:
+        require_nox(car, f"nox_weight {nox_weight:g}")
+    case = case_with(None)
+    share = 0.5 / (levels - 1)
+    for _ in range(_REFINEMENTS_MAX if refine else 0):
+        before = case
+        around = Around(torques_of(case.dp_trajectory, case.problem.table), share)
+        case = case_with(around)
+        case = replace(case, dp_s=case.dp_s + before.dp_s)
+        moved_kg = abs(case.dp_trajectory.cost_kg - before.dp_trajectory.cost_kg)
+        if moved_kg < _REFINED_ENOUGH * before.dp_trajectory.cost_kg:
+            break
+        share /= 2
+    return case
+
+
+def require_nox(car: Architecture, asking: str) -> None:
+    """UnknownNoxError where the car's engine has no data on NOx; `asking` is how a message names what needs it."""
+    if not car.engine.nox_known:
+        raise UnknownNoxError(
+            f"{car.name}: {asking} needs NOx data, but engine {printable(car.engine.name)!r} has none; "
+            "add nox_gps to its fuel_map, or nox_coefficients, or leave NOx out"
+        )
+
+
+def dp_case(
+    car: Architecture, cycle: Cycle, problem: Problem, target_gap: float = TARGET_GAP
+) -> Case:
+    """A problem of a car on a cycle, solved by dynamic programming and certified along its rollout."""
+    began = perf_counter()
+    plan = dp.solve(problem)
+    trajectory = simulate(problem, plan.control)
+    dp_s = perf_counter() - began
+    certificate = certify(problem, trajectory, target_gap=target_gap)
+    return Case(car, cycle, problem, certificate, plan, trajectory, dp_s)

@@ -1,0 +1,244 @@
+"""The file of a sweep: a car, cycles, strategies and parameters, checked in full before anything runs.
+
+`[parameters]` gives each key path of the architecture (`machine.power_max_w`), or `nox_weight`, a list of values
+or a range `{ from, to, count, log }`. A component and keys of it can both be parameters where these are quoted:
+`engine = [...]` and `"engine.idle_rpm" = [...]`. Paths in the file are relative to it; names mean shipped files.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from hevopt.car.architecture import Architecture
+from hevopt.car_files.load import COMPONENTS, load_architecture
+from hevopt.driving.cycle import load_cycle
+from hevopt.errors import DataError, unknown_name
+from hevopt.files.lookup import find, is_path
+from hevopt.files.shown import printable, shown
+from hevopt.files.toml import FileModel, faults_of, good_keys, read_contents
+from hevopt.strategies import STRATEGIES, fitting
+from hevopt.sweeps.plan.constraints import Constraint, parse
+from hevopt.sweeps.plan.jobs import BOUND
+from hevopt.sweeps.plan.parameters import (
+    DESIGNS_MAX,
+    Range,
+    Values,
+    flattened,
+    kind_of,
+    parameter_faults,
+    values_of,
+)
+
+_PARAMETERS_MAX = 32
+_FAULTS_LISTED, _MODEL_FAULTS = 20, 200
+# The keys of the whole file that may follow a table by mistake, and so fall into it.
+_OF_THE_FILE = ("architecture", "cycles", "strategies", "allow_shortfall", "constraints")
+_Names = Annotated[list[str], Field(min_length=1, max_length=1000)]
+
+
+class SampleFile(FileModel):
+    """A sample of the designs in place of every combination."""
+
+    method: Literal["sobol", "latin_hypercube"]
+    count: Annotated[int, Field(ge=1, le=DESIGNS_MAX)]
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+
+
+class StudyFile(FileModel):
+    architecture: str
+    cycles: _Names
+    strategies: _Names
+    allow_shortfall: bool = False
+    parameters: Annotated[dict[str, Any], Field(max_length=_PARAMETERS_MAX)]
+    sample: SampleFile | None = None
+    constraints: Annotated[list[str], Field(default_factory=list, max_length=1000)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SweepStudy:
+    """What to sweep.
+
+    source: the study file; architecture, cycles: names of shipped files, or absolute paths
+    parameters: key path of the architecture, or `nox_weight`, -> its values, in order and as written
+    sample: None for every combination
+    """
+
+    source: Path
+    architecture: str
+    cycles: tuple[str, ...]
+    strategies: tuple[str, ...]
+    allow_shortfall: bool
+    parameters: Mapping[str, Values]
+    sample: SampleFile | None
+    constraints: tuple[Constraint, ...]
+
+
+def read_study(path: str | Path) -> SweepStudy:
+    """The study of a file; DataError with its faults, each with its place."""
+    study, faults = study_and_faults(Path(path))
+    _raise(Path(path), faults)
+    return study
+
+
+def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
+    """The study of a file, None where it has faults, and every fault, those beside wrong keys as well."""
+    contents = read_contents(path)
+    faults = _without_misplaced(contents)
+    faults += _with_flat_parameters(contents)
+    count, in_model = faults_of(contents, StudyFile, _MODEL_FAULTS)
+    faults += in_model + ([f"and {count - len(in_model)} more"] if count > len(in_model) else [])
+    good, folder = good_keys(contents, StudyFile), path.parent
+    parameters = _parameters(good.get("parameters", {}), "sample" in contents, faults)
+    architecture, car = _car(folder, good.get("architecture"), faults)
+    cycles = _cycles(folder, good.get("cycles", ()), faults)
+    faults += _strategy_faults(good.get("strategies", ()), car)
+    if car is not None:
+
+        def load(changes: Mapping[str, Any]) -> Architecture:
+            return load_architecture(architecture, located_changes(folder, changes))
+
+        faults += parameter_faults(load, parameters)
+    constraints: tuple[Constraint, ...] = ()
+    if parameters and len(parameters) == len(contents["parameters"]):
+        constraints = _constraints(good.get("constraints", ()), parameters, faults)
+    if faults:
+        return None, list(dict.fromkeys(faults))
+    data = StudyFile.model_validate(contents)
+    return SweepStudy(
+        path, architecture, cycles, tuple(data.strategies), data.allow_shortfall,
+        parameters, data.sample, constraints,
+    ), []  # fmt: skip
+
+
+def located_changes(folder: Path, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Key path -> value with the paths of components taken from the folder of the study."""
+    return {
+        key: str((folder / value).absolute())
+        if key in COMPONENTS and isinstance(value, str) and is_path(value, ".toml")
+        else value
+        for key, value in changes.items()
+    }
+
+
+def _raise(path: Path, faults: Sequence[str]) -> None:
+    if len(faults) == 1:
+        raise DataError(f"{path}, {faults[0]}")
+    if faults:
+        raise DataError.of(str(path), faults[:_FAULTS_LISTED], len(faults))
+
+
+def _without_misplaced(contents: dict[str, Any]) -> list[str]:
+    """Take keys of the whole file out of the tables that they fell into; a fault for each."""
+    faults = []
+    for table in ("sample", "parameters"):
+        inner = contents.get(table)
+        fallen = [key for key in _OF_THE_FILE if isinstance(inner, dict) and key in inner]
+        for key in fallen:
+            faults.append(
+                f"{table}.{key}: {key} is a key of the whole file; write it above the first [table]"
+            )
+            contents.setdefault(key, inner.pop(key))
+    return faults
+
+
+def _with_flat_parameters(contents: dict[str, Any]) -> list[str]:
+    """Make the parameters key paths and their values; the faults in that."""
+    tables = contents.setdefault("parameters", {})
+    if not isinstance(tables, dict):
+        return []
+    given = list(flattened(tables))
+    contents["parameters"] = dict(given)
+    if given:
+        return _twice("parameters", [key for key, _ in given])
+    return [
+        "parameters: nothing to vary; add the table [parameters] with a line such as "
+        "machine.power_max_w = [15e3, 18e3]"
+    ]
+
+
+def _twice(place: str, names: Sequence[str]) -> list[str]:
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    return [f"{place}: {shown(name)} is given twice; give it once" for name in twice]
+
+
+def _car(folder: Path, name: str | None, faults: list[str]) -> tuple[str, Architecture | None]:
+    """The architecture's name or absolute path, and the car before any change, None where it has faults."""
+    if name is None:
+        return "", None
+    try:
+        located = _located("architectures", name, ".toml", folder)
+        return located, load_architecture(located)
+    except DataError as error:
+        faults.append(f"architecture: {error}")
+        return name, None
+
+
+def _cycles(folder: Path, names: Sequence[str], faults: list[str]) -> tuple[str, ...]:
+    """The cycles' names or absolute paths."""
+    located, by_name = [], {}
+    for name in names:
+        try:
+            located.append(_located("cycles", name, ".csv", folder))
+            by_name.setdefault(load_cycle(located[-1]).name, {})[located[-1]] = name
+        except DataError as error:
+            faults.append(f"cycles: {error}")
+    faults += _twice("cycles", names)
+    for name, files in by_name.items():
+        if len(files) > 1:
+            listed = ", ".join(printable(given) for given in files.values())
+            faults.append(
+                f"cycles: {len(files)} files have the name {shown(name)}: {listed}; results are told apart by "
+                "it: rename a file, or leave one out"
+            )
+    return tuple(located)
+
+
+def _located(kind: str, name: str, suffix: str, folder: Path) -> str:
+    if not is_path(name, suffix):
+        return name
+    return str(find(kind, name, suffix, beside=folder).absolute())
+
+
+def _strategy_faults(names: Sequence[str], car: Architecture | None) -> Iterator[str]:
+    """What is wrong with the strategies; of a car that has faults itself, any may fit."""
+    known = [*(fitting(car.functions, every=True) if car else STRATEGIES), BOUND]
+    for name in names:
+        if name in STRATEGIES and name not in known:
+            yield f"strategies: {name} does not fit {car.name}; allowed: {', '.join(known)}"
+        elif name not in known:
+            error = unknown_name("strategy", printable(name), known)
+            yield f"strategies: {error}"
+    yield from _twice("strategies", names)
+
+
+def _parameters(given: Mapping[str, Any], sampled: bool, faults: list[str]) -> dict[str, Values]:
+    parameters = {}
+    for key, value in given.items():
+        try:
+            values = parameters[key] = values_of(key, value)
+        except DataError as error:
+            faults += error.listed
+            continue
+        if not sampled and isinstance(values, Range) and values.count is None:
+            faults.append(
+                f"parameters.{printable(key)}: count is missing; say how many values to take, or add the "
+                "table [sample]"
+            )
+    return parameters
+
+
+def _constraints(
+    texts: Sequence[str], parameters: Mapping[str, Values], faults: list[str]
+) -> tuple[Constraint, ...]:
+    kinds = {key: kind_of(values) for key, values in parameters.items()}
+    read = []
+    for text in texts:
+        try:
+            read.append(parse(text, kinds))
+        except DataError as error:
+            faults.append(f"constraints: {error}")
+    return tuple(read)

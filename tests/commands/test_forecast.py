@@ -1,0 +1,55 @@
+"""What a long drive will take is said beforehand, from what pieces of it took."""
+
+import numpy as np
+import pytest
+
+from hevopt.commands import forecast
+from hevopt.driving.cycle import Cycle
+from hevopt.errors import InfeasibleError
+
+
+def drive(steps: int) -> Cycle:
+    """A drive that stands still but for a stretch behind its middle."""
+    time_s = np.arange(steps + 1.0)
+    speed = np.where((time_s > 0.6 * steps) & (time_s < 0.7 * steps), 20.0, 0.0)
+    return Cycle("long", time_s, speed, np.zeros(steps + 1))
+
+
+def said(steps, monkeypatch, capsys, *, all_s, step_s):
+    """What is printed where every drive takes all_s seconds, and every step of it step_s more."""
+    now = [0.0]
+    monkeypatch.setattr(forecast, "perf_counter", lambda: now[0])
+
+    def solve(piece):
+        now[0] += all_s + step_s * (len(piece.time_s) - 1)
+
+    forecast.say_how_long(drive(steps), solve)
+    printed = capsys.readouterr()
+    assert not printed.out
+    return printed.err
+
+
+def test_what_a_drive_takes_is_told_apart_from_what_a_step_takes(monkeypatch, capsys):
+    line = said(36_000, monkeypatch, capsys, all_s=5.0, step_s=2e-3)
+    assert line == "hevopt: 36000 steps will take about 80 s, as 1000 of them take 7.0 s\n"
+    assert "about 10 min," in said(200_000, monkeypatch, capsys, all_s=0.0, step_s=3e-3)
+    assert "about 2.8 h," in said(200_000, monkeypatch, capsys, all_s=0.0, step_s=5e-2)
+
+
+@pytest.mark.parametrize("steps, step_s", [(9_999, 10.0), (36_000, 8e-4)])
+def test_nothing_is_said_of_short_drives_and_quick_ones(steps, step_s, monkeypatch, capsys):
+    assert said(steps, monkeypatch, capsys, all_s=0.0, step_s=step_s) == ""
+
+
+def test_a_piece_that_cannot_be_solved_says_nothing(capsys):
+    def solve(piece):
+        raise InfeasibleError("no feasible control at step 3")
+
+    forecast.say_how_long(drive(20_000), solve)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_piece_is_one_that_is_driven():
+    piece = forecast.piece_of(drive(20_000), 1000)
+    assert len(piece.time_s) == 1001
+    assert piece.distance_m > 19_900

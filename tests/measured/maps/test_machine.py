@@ -1,0 +1,99 @@
+"""What `hevopt maps import` makes of a machine's points, against the formula that they were sampled from."""
+
+import numpy as np
+import pytest
+from map_bench import RPM, car_with, write
+
+from hevopt import load_architecture
+from hevopt.car import machine as machine_model
+
+MACHINE = load_architecture("C2").machine
+LIKE = ("--like", "machine_flywheel_18kw")
+IMPORT = ("maps", "import", "m.csv", "--kind", "machine", *LIKE)
+SPEEDS = (250, 500, 1000, 1500, 2000, 2500, 3000, 4000, 5000, 6000)
+
+
+def bench(signs=(1, -1)) -> tuple[np.ndarray, ...]:
+    """rpm, Nm, shaft power and loss at shares of the limit, as a bench without a no-load test measures them."""
+    rpm = np.repeat(SPEEDS, 7)
+    torque = machine_model.torque_limit_nm(MACHINE, rpm * RPM)
+    torque = torque * np.tile([0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0], len(SPEEDS))
+    rpm, torque = np.tile(rpm, len(signs)), np.concatenate([sign * torque for sign in signs])
+    return rpm, torque, rpm * RPM * torque, machine_model.loss_w(MACHINE, torque, rpm * RPM)
+
+
+@pytest.mark.parametrize("signs", [(1,), (1, -1)])
+def test_the_loss_without_torque_is_assumed_near_the_truth_and_leaves_no_band(hevopt, signs):
+    rpm, torque, power, loss = bench(signs)
+    efficiency = np.where(power > 0, power / (power + loss), (power + loss) / power)
+    write("m.csv", "speed [rpm],torque [Nm],efficiency [%]", rpm, torque, 100 * efficiency)
+    seen = hevopt(*IMPORT)
+    assert seen.status == 0, seen
+    assert (
+        "not measured at 10 of 10 speeds (250 to 6000 rpm); ASSUMED to be that of the" in seen.out
+    )
+    machine = load_architecture(car_with("machine", "m.toml")).machine
+    speed, share = np.meshgrid(np.linspace(250, 6000, 116) * RPM, np.linspace(-0.12, 0.12, 41))
+    load = share * machine_model.torque_limit_nm(MACHINE, speed)
+    found = machine_model.loss_w(machine, load, speed)
+    assert not np.isnan(found).any()
+    truth = machine_model.loss_w(MACHINE, load, speed)
+    # The loss at the lowest torque measured is 7 W above that at 0; the rest is the bend over speed.
+    assert np.abs(found - truth).max() < 25 and np.abs(found - truth).mean() < 8
+
+
+def test_a_measured_loss_without_torque_is_kept(hevopt):
+    rpm, torque, _, loss = bench()
+    still = machine_model.loss_w(MACHINE, np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
+    columns = [*rpm, *SPEEDS], [*torque, *(0.0 for _ in SPEEDS)], [*loss, *still]
+    write("m.csv", "speed [rpm],torque [Nm],loss [W]", *columns)
+    seen = hevopt(*IMPORT)
+    assert seen.status == 0 and "ASSUMED" not in seen.out, seen
+    machine = load_architecture(car_with("machine", "m.toml")).machine
+    found = machine_model.loss_w(machine, np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
+    np.testing.assert_allclose(found, still, rtol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_the_full_load_curve_is_the_limit_and_the_map_reaches_up_to_it(hevopt, scale):
+    rpm, torque = np.meshgrid([0.0, *SPEEDS], np.linspace(-120, 120, 25))
+    loss = machine_model.loss_w(MACHINE, torque, rpm * RPM)
+    columns = "speed [rpm],torque [Nm],loss [W]", rpm.ravel(), torque.ravel(), loss.ravel()
+    write("m.csv", *columns)
+    # A curve that bends where the map has no line, partly well below the hyperbola of its largest power.
+    curve_rpm, curve_nm = np.array([0, 1100, 2700, 6000]), np.array([97.0, 97.0, 41.0, 12.0])
+    write("full.csv", "speed [rpm],torque [Nm]", curve_rpm, curve_nm)
+    seen = hevopt(*IMPORT, "--full-load", "full.csv")
+    assert seen.status == 0 and "full-load curve: torque is straight" in seen.out, seen
+    car = load_architecture(car_with("machine", "m.toml"), {"machine.scale.power": scale})
+    speed = np.linspace(0, 6000, 241)
+    limit = machine_model.torque_limit_nm(car.machine, speed * RPM)
+    most_w = (curve_nm * curve_rpm * RPM).max()
+    straight = np.interp(speed, curve_rpm, curve_nm)
+    expected = np.minimum(straight, most_w / np.maximum(speed * RPM, 1e-9))
+    assert (expected < straight).any() and (expected == straight).any()
+    np.testing.assert_allclose(limit, scale * expected, rtol=1e-5)
+    for sign in (1, -1):
+        found = machine_model.loss_w(car.machine, sign * limit, speed * RPM)
+        assert not np.isnan(found).any()
+    assert machine_model.torque_limit_nm(car.machine, np.array([6001 * RPM])) == 0
+
+
+def test_electric_power_without_its_sign_while_generating_is_refused(hevopt):
+    rpm, torque, power, loss = bench()
+    write("m.csv", "speed [rpm],torque [Nm],electric power [W]", rpm, torque, abs(power + loss))
+    seen = hevopt(*IMPORT)
+    assert seen.status == 2 and "electric power is negative while generating" in seen.err, seen
+    assert "m.csv, lines 7" in seen.err and seen.out == ""
+    write("m.csv", "speed [rpm],torque [Nm],electric power [W]", rpm, torque, power + loss)
+    assert hevopt(*IMPORT).status == 0
+
+
+def test_efficiency_above_all_is_named_with_its_line_and_how_it_was_read(hevopt):
+    rpm, torque, power, loss = bench((1,))
+    efficiency = 100 * power / (power + loss)
+    efficiency[4] = 104
+    write("m.csv", "speed [rpm],torque [Nm],efficiency [%]", rpm, torque, efficiency)
+    seen = hevopt(*IMPORT)
+    assert seen.status == 2 and "line 6: efficiency up to 1.04; allowed: up to 1" in seen.err, seen
+    assert "efficiency [%] in % (header)" in seen.err

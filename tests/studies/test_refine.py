@@ -1,0 +1,40 @@
+"""Torque levels added around a plan, until its cost settles."""
+
+import pytest
+
+from hevopt import load_architecture, load_cycle, simulate
+from hevopt.strategies import STRATEGIES, fitting
+from hevopt.studies.case import prepare
+
+
+def cost_and_bound(case):
+    trajectory = simulate(case.problem, case.dp_plan.control)
+    bound, _ = case.certificate.bound_kg(trajectory.end_j)
+    return trajectory.cost_kg, bound
+
+
+@pytest.mark.parametrize("name", ["C2", "E"])
+def test_few_levels_refined_come_to_what_many_levels_give(name):
+    car, cycle = load_architecture(name), load_cycle("nedc")
+    coarse, _ = cost_and_bound(prepare(car, cycle, levels=6))
+    refined, bound = cost_and_bound(prepare(car, cycle, levels=6, refine=True))
+    many, _ = cost_and_bound(prepare(car, cycle, levels=161))
+    assert coarse > many * 1.0005
+    assert refined == pytest.approx(many, rel=4e-4)
+    assert bound <= refined <= 1.0005 * bound
+
+
+@pytest.mark.parametrize("name", ["B", "C1", "D"])
+def test_the_default_levels_need_no_refinement(name):
+    car, cycle = load_architecture(name), load_cycle("nedc")
+    costs = [cost_and_bound(prepare(car, cycle, refine=refine))[0] for refine in (False, True)]
+    assert costs[1] == pytest.approx(costs[0], rel=2e-4)
+
+
+def test_the_certificate_is_of_the_table_with_the_added_levels():
+    car = load_architecture("C2")
+    case = prepare(car, load_cycle("hwfet"), levels=6, refine=True)
+    assert any(control.level.startswith("refined") for control in case.problem.table.controls)
+    for name in fitting(car.functions):
+        trajectory = simulate(case.problem, STRATEGIES[name].solve(case.problem).control)
+        assert case.certificate.bound_kg(trajectory.end_j)[0] <= trajectory.cost_kg * (1 + 1e-12)
