@@ -13,15 +13,46 @@ _PIECES = 24
 
 
 @compiled()
+def _may_turn(power, step, battery):
+    """Whether more stored energy before a step could leave less after it, its drain rising faster than the energy.
+
+    Per joule the drain rises by at most I² (dR/dSOC) / (sqrt(U² - 4 R P) Q): only where resistance rises.
+    """
+    ohms = battery.charge_ohm if power < 0.0 else battery.discharge_ohm
+    for i in range(len(battery.soc) - 1):
+        rise = ohms[i + 1] - ohms[i]
+        if rise <= 0.0:
+            continue
+        low_v = battery.open_circuit_v[i]
+        root = low_v
+        if power > 0.0:
+            root = np.sqrt(max(low_v * low_v - 4.0 * ohms[i + 1] * power, 1e-12 * low_v * low_v))
+        current = 2.0 * abs(power) / (low_v + root)
+        width = battery.soc[i + 1] - battery.soc[i]
+        if step * current * current * rise / width >= root * battery.capacity_as:
+            return True
+    return False
+
+
+@compiled()
 def _energy_before(after, power, step, low, high, battery):
-    """Stored energy within [low, high] from which a step leads to `after`; clipped to the window."""
+    """Stored energy within [low, high] from which a step leads to `after`; clipped to the window.
+
+    What is left rises with what was stored (see _may_turn), so halving finds it where repetition does not settle.
+    """
     energy = min(max(after, low), high)
     for _ in range(100):
         moved = after + step * chemical_power_at(power, energy, battery)
         moved = min(max(moved, low), high)
         if abs(moved - energy) <= 1e-12 * high:
-            break
+            return energy
         energy = moved
+    for _ in range(100):
+        energy = 0.5 * (low + high)
+        if energy - step * chemical_power_at(power, energy, battery) < after:
+            low = energy
+        else:
+            high = energy
     return energy
 
 
@@ -50,6 +81,9 @@ def reachable(first, power, step_s, allowed, low, high, end_min, battery):
                 i = start + (count - visit) % count  # the first, the last, then inwards
                 if least_w <= power[i] <= most_w:
                     continue
+                if _may_turn(power[i], step_s[k], battery):
+                    lowest, highest = low, high  # anywhere: the rollout tells
+                    break
                 a = _energy_before(bottom, power[i], step_s[k], low, high, battery)
                 b = _energy_before(top, power[i], step_s[k], low, high, battery)
                 after_a = a - step_s[k] * chemical_power_at(power[i], a, battery)

@@ -1,0 +1,32 @@
+"""From where the end can be reached: never less than there is, whatever the battery."""
+
+import numpy as np
+import pytest
+
+from hevopt import Battery, ControlTable, Problem, certify, simulate, solve
+
+
+def charged_once(charge_ohm, asked: float, start: float = 0.0) -> Problem:
+    """One step that charges a small battery with 1000 W for 50 s."""
+    battery = Battery([0, 1], [100, 100], [0, 0], charge_ohm, capacity_as=1000)
+    table = ControlTable.from_arrays(np.ones((1, 1)), np.full((1, 1), -1000.0), step_s=50.0)
+    return Problem(table, battery, start, asked)
+
+
+@pytest.mark.parametrize("strategy", ["dp", "ecms"])
+@pytest.mark.parametrize("rise_ohm, asked", [(100, 0.499), (100, 0.45), (30, 0.499)])
+def test_a_fuller_battery_that_ends_emptier_does_not_hide_a_plan(strategy, rise_ohm, asked):
+    # Resistance rises so steeply that from SOC 0.1 less is left after the step than from 0.
+    problem = charged_once([0, rise_ohm], asked)
+    trajectory = simulate(problem, solve(problem, strategy).control)
+    assert trajectory.soc[-1] >= asked
+    assert certify(problem, trajectory).bound_of(trajectory)[0] <= trajectory.cost_kg
+
+
+@pytest.mark.parametrize("start", np.linspace(0.0, 0.3, 7))
+def test_resistance_that_falls_steeply_does_not_either(start):
+    problem = charged_once([100, 0], 0.0, start)
+    ended = simulate(problem, np.zeros(1, np.int64)).soc[-1]
+    for asked in (0.999 * ended, 0.7 * ended):
+        reached = charged_once([100, 0], float(asked), start)
+        assert simulate(reached, solve(reached).control).soc[-1] == ended
