@@ -35,8 +35,6 @@ app = typer.Typer(
 )
 
 _INTERRUPTED = 130
-# A wrong option or argument. Click's class, which typer imports from click or carries along.
-_UsageError = typer.BadParameter.__bases__[0]
 
 
 @app.callback(invoke_without_command=True)
@@ -86,9 +84,6 @@ def _status_and_message() -> tuple[int, str]:
     try:
         # An int where typer was left by typer.Exit, else what the command returned: None.
         return app(standalone_mode=False) or 0, ""
-    except _UsageError as error:
-        error.show()
-        return error.exit_code, ""
     except HevoptError as error:
         return error.exit_status, f"error: {error}"
     except OSError as error:
@@ -108,6 +103,12 @@ def _status_and_message() -> tuple[int, str]:
         if not _comes_from_interrupt(error):
             raise
         return _INTERRUPTED, ""
+    except Exception as error:
+        # A wrong option or argument: click's class, which typer imports or carries along under its own name.
+        if not (hasattr(error, "show") and hasattr(error, "exit_code")):
+            raise
+        error.show()
+        return error.exit_code, ""
 
 
 def _comes_from_interrupt(error: BaseException | None) -> bool:
