@@ -10,8 +10,8 @@ import numpy as np
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import HevoptError
 
-_LONG_STEPS = 10_000
-_SHORT_PIECE, _LONG_PIECE = 250, 1000
+_LONG_STEPS = 20_000
+_SHORT_PIECE, _LONG_PIECE = 1000, 2000
 _WORTH_SAYING_S = 30.0
 
 
@@ -19,7 +19,8 @@ def say_how_long(drive: Cycle, solve: Callable[[Cycle], object]) -> None:
     """One line on stderr about a drive that will take longer than some tens of seconds.
 
     What all drives take and what a step takes are told apart by two pieces; both were measured to grow in
-    proportion (reports/benchmarks_long.md). A piece that cannot be solved leaves the word to the drive itself.
+    proportion (reports/benchmarks_long.md). Shorter pieces may need dearer proofs than any long drive. A piece that
+    cannot be solved leaves the word to the drive itself.
     """
     steps = len(drive.time_s) - 1
     if steps < _LONG_STEPS:
@@ -29,7 +30,9 @@ def say_how_long(drive: Cycle, solve: Callable[[Cycle], object]) -> None:
         short_s, long_s = (_seconds(solve, drive, n) for n in (_SHORT_PIECE, _LONG_PIECE))
     except HevoptError:
         return
-    step_s = max(long_s - short_s, 0.0) / (_LONG_PIECE - _SHORT_PIECE)
+    step_s = (long_s - short_s) / (_LONG_PIECE - _SHORT_PIECE)
+    if step_s <= 0:  # a short piece that was dearer to prove, or a busy machine
+        step_s = long_s / _LONG_PIECE
     total_s = long_s + step_s * (steps - _LONG_PIECE)
     if total_s > _WORTH_SAYING_S:
         print(

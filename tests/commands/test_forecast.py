@@ -31,14 +31,21 @@ def said(steps, monkeypatch, capsys, *, all_s, step_s):
 
 def test_what_a_drive_takes_is_told_apart_from_what_a_step_takes(monkeypatch, capsys):
     line = said(36_000, monkeypatch, capsys, all_s=5.0, step_s=2e-3)
-    assert line == "hevopt: 36000 steps will take about 80 s, as 1000 of them take 7.0 s\n"
+    assert line == "hevopt: 36000 steps will take about 80 s, as 2000 of them take 9.0 s\n"
     assert "about 10 min," in said(200_000, monkeypatch, capsys, all_s=0.0, step_s=3e-3)
     assert "about 2.8 h," in said(200_000, monkeypatch, capsys, all_s=0.0, step_s=5e-2)
 
 
-@pytest.mark.parametrize("steps, step_s", [(9_999, 10.0), (36_000, 8e-4)])
+@pytest.mark.parametrize("steps, step_s", [(19_999, 10.0), (36_000, 8e-4)])
 def test_nothing_is_said_of_short_drives_and_quick_ones(steps, step_s, monkeypatch, capsys):
     assert said(steps, monkeypatch, capsys, all_s=0.0, step_s=step_s) == ""
+
+
+def test_a_short_piece_that_takes_longer_than_a_long_one_is_left_out_of_account(
+    monkeypatch, capsys
+):
+    line = said(100_000, monkeypatch, capsys, all_s=5.0, step_s=-1e-3)
+    assert line == "hevopt: 100000 steps will take about 2 min, as 2000 of them take 3.0 s\n"
 
 
 def test_a_piece_that_cannot_be_solved_says_nothing(capsys):
