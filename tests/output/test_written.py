@@ -82,7 +82,7 @@ def compare(hevopt, tmp_path):
 def test_stopped_between_two_files_a_command_says_which_there_are(
     compare, monkeypatch, tmp_path, stop
 ):
-    whole = "hevopt.pages.results.Results.packed"
+    whole = "hevopt.pages.comparison.results.Results.packed"
     monkeypatch.setattr(whole, lambda self: b"x")
 
     def written(path, contents, write=write_whole):
