@@ -57,6 +57,9 @@ def test_on_paper_every_figure_is_drawn_light_and_within_the_page(shown):
     page = shown.page
     page.emulate_media(media="print", color_scheme="dark")
     settle(page)
+    page.wait_for_function(
+        "[...document.querySelectorAll('.plot')].every(p => /^#f+$/.test(p._fullLayout.paper_bgcolor))"
+    )
     looks = page.evaluate(
         "[...document.querySelectorAll('.plot')].map(p => "
         "[p.querySelector('.main-svg').getBoundingClientRect().width, p._fullLayout.paper_bgcolor])"
