@@ -10,6 +10,8 @@ from pathlib import Path
 from hevopt.errors import DataError
 from hevopt.files.shown import printable
 
+# A lock that another sweep removes meanwhile is taken anew; each time means a file system without lasting files.
+_TRIES_MAX = 1000
 _OWNER_BYTES = 200
 
 
@@ -40,7 +42,7 @@ def locked(store: Path) -> Iterator[None]:
 
 
 def _acquired(path: Path, store: Path) -> int:
-    while True:
+    for _ in range(_TRIES_MAX):
         try:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         except OSError as error:
@@ -65,6 +67,9 @@ def _acquired(path: Path, store: Path) -> int:
         if _is_file_at(descriptor, path):
             return descriptor
         os.close(descriptor)
+    raise DataError(
+        f"{store}: its lock is gone each time it is taken; name a store on a local disk, with --store"
+    )
 
 
 def _is_file_at(descriptor: int, path: Path) -> bool:
