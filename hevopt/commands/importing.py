@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def import_cycle(
-    file: Annotated[Path, typer.Argument(help="CSV, TSV, Excel, .mat or VECTO .vdri file.")],
+    file: Annotated[
+        Path, typer.Argument(help="CSV, TSV, Excel, .mat, VECTO .vdri or VBOX .vbo file.")
+    ],
     speed_unit: Annotated[
         str | None, typer.Option(help="Unit of speed where the file names none: km/h, m/s, mph ...")
     ] = None,

@@ -35,7 +35,7 @@ _ACCELERATION_MAX_MPS2 = 20.0
 DISTANCE_MIN_M = 1.0
 # For a log or another tool's cycle given where one of our own is expected.
 IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
-_OTHERS = (".xls", ".xlsx", ".mat", ".vdri", ".tsv")
+_OTHERS = (".xls", ".xlsx", ".mat", ".vdri", ".vbo", ".tsv")
 # Called with every fault found: line and text.
 _Tell = Callable[[int, str], None]
 # Plainer than Python's own: no underscores, no digits of other scripts.

@@ -32,6 +32,15 @@ def _logs() -> list[Seed]:
         "units_row.tsv": table("time\tspeed\ns\tmph", "{:g}\t{:.3f}", time, speed / 0.44704),
         "dynaprog.csv": table("time_s,speed_kmh", "{:.1f},{:.3f}", time + 0.1 * np.sin(time), speed * 3.6),
     }  # fmt: skip
+    clock = np.where(time < 30, 235_930 + time, np.where(time < 90, time - 30, time + 10))
+    head = (
+        "[header]\nsatellites\ntime\nvelocity kmh\n\n[column names]\nsats time velocity\n\n[data]"
+    )
+    texts["vbox.vbo"] = table(head, "{:03.0f} {:09.2f} {:07.3f}", 0 * time + 8, clock, speed * 3.6)
+    form = '"{0:.1f}";"Engine RPM";"{1:.0f}";"rpm";\n"{0:.2f}";"Vehicle speed";"{2:.2f}";"km/h";'
+    texts["signals.csv"] = table(
+        '"SECONDS";"PID";"VALUE";"UNITS";', form, time, 900 + time, speed * 3.6
+    )
     pairs = zip(time.tolist(), (speed * 3.6).tolist(), strict=True)
     texts["log.xlsx"] = _workbook([["time [s]", "speed [km/h]"], *pairs])
     cycle = {"cyc_mph": np.column_stack([time, speed / 0.44704])}

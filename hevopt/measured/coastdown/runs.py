@@ -18,6 +18,8 @@ from hevopt.measured.coastdown.fit import Run
 from hevopt.measured.tables import aliases as column_names
 from hevopt.measured.tables import rows as measured_rows
 from hevopt.measured.tables.clock_ticks import spread_evenly, ticks_of
+from hevopt.measured.tables.packed_clock import as_clock
+from hevopt.measured.tables.samples import at_samples_of
 from hevopt.measured.tables.table import (
     Column,
     Measured,
@@ -79,6 +81,8 @@ def _parts(
 ) -> tuple[list[tuple[Array, Array, str, Way]], list[str]]:
     """Time, speed, place and direction of every run of a file, and how it was read."""
     measured = read_measured(path, sheet=sheet)
+    if speed := _column(measured, "speed", columns.get("speed")):
+        measured = at_samples_of(measured, speed)
     values, ways, notes = _values(measured, columns, units)
     time, begins = values["time"], np.zeros(max(len(values["time"]) - 1, 0), dtype=bool)
     if "run" in values:
@@ -138,6 +142,7 @@ def _values(
     """Values of each role by row, the directions where a column has them, and notes."""
     values, ways, notes = {}, None, list(measured.notes)
     chosen = {role: _column(measured, role, columns.get(role)) for role in ROLES}
+    chosen["time"] = as_clock(chosen["time"])
     _check_missing(measured, chosen, units)
     for role, column in chosen.items():
         if column is None:

@@ -11,6 +11,8 @@ from hevopt.files.shown import shown
 from hevopt.measured.cycles.dates import date_beside, with_dates
 from hevopt.measured.tables import aliases as column_names
 from hevopt.measured.tables.names import base_of, grade_ends_step
+from hevopt.measured.tables.packed_clock import as_clock
+from hevopt.measured.tables.samples import at_samples_of
 from hevopt.measured.tables.table import (
     Column,
     Measured,
@@ -89,6 +91,9 @@ def drive_of(measured: Measured, columns: Mapping[str, str], units: Mapping[str,
         if given not in ROLES:
             raise unknown_name("role of a column", given, list(ROLES))
     chosen = _chosen_columns(measured, columns)
+    if chosen["speed"] is not None:
+        measured = at_samples_of(measured, chosen["speed"])
+        chosen = _chosen_columns(measured, columns)
     _check_missing(measured, chosen, units)
     _check_together(measured, chosen, units)
     notes, values = [], {}
@@ -121,6 +126,7 @@ def _chosen_columns(measured: Measured, columns: Mapping[str, str]) -> dict[str,
         chosen["speed"] = _alone(measured, "speed", chosen)
     if chosen["time"] is None and chosen["distance"] is None and "time" not in columns:
         chosen["time"] = _alone(measured, "time", chosen)
+    chosen["time"] = as_clock(chosen["time"])
     if chosen["time"] is not None and "distance" not in columns:
         chosen["distance"] = chosen["stop"] = None
     if chosen["time"] is not None and "date" not in columns:

@@ -137,17 +137,15 @@ def _table(
             f"{path}: {len(lines)} points of {len(flat)} variables; allowed: up to {ROWS_MAX} points and "
             f"{CELLS_MAX} numbers; save fewer"
         )
-    notes = [f"MATLAB file, {what}"]
-    rest = [cleaned(name) for name in variables if name not in flat]
-    if rest:
-        notes.append(f"left out, not over these: {', '.join(rest)}")
+    rest = ", ".join(cleaned(name) for name in variables if name not in flat)
     return Table(
         [cleaned(name) for name in flat],
         [_unit(name) for name in flat],
         [cells_of(values) for values in flat.values()],
         lines,
-        notes,
+        [f"MATLAB file, {what}"],
         CONVENTION,
+        left_out=f"left out, not over these: {rest}" * bool(rest),
     )
 
 

@@ -112,7 +112,7 @@ def _column(measured: Measured, source: Source, role: str) -> Column | None:
 def _needed(measured: Measured, source: Source, role: str) -> Column:
     column = _column(measured, source, role)
     if column is None:
-        rest = "".join(f"; {note}" for note in measured.notes if note.startswith("left out"))
+        rest = f"; {measured.left_out}" * bool(measured.left_out)
         raise DataError(
             f"{measured.path}: no column of {role} found; name it with --column {role}=NAME (a grid needs "
             f"numbers in its first row behind a label in its first cell); {columns_found(measured)}{rest}"

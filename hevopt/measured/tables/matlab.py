@@ -167,10 +167,10 @@ def columns_table(path: Path, variables: Variables) -> Table:
             f"{path}: {wide} columns of {rows} rows; allowed: up to {_COLUMNS_MAX} columns and {CELLS_MAX} "
             "numbers; save fewer variables"
         )
-    names, units, columns, left_out = [], [], [], []
+    names, units, columns, others = [], [], [], []
     for name, array in variables.items():
         if name not in arrays or len(arrays[name]) != rows:
-            left_out.append(f"{cleaned(name)} ({_shape(array)})")
+            others.append(f"{cleaned(name)} ({_shape(array)})")
             continue
         array = arrays[name]
         for i in range(array.shape[1]):
@@ -178,9 +178,9 @@ def columns_table(path: Path, variables: Variables) -> Table:
             units.append(array_unit(name, array, i))
             columns.append(cells_of(array[:, i]))
     notes = ["MATLAB file, lines are row numbers", *arranging]
-    if left_out:
-        notes.append(f"left out, not of {rows} rows of numbers: {', '.join(left_out)}")
-    return Table(names, units, columns, np.arange(1, rows + 1), notes, CONVENTION)
+    left_out = f"left out, not of {rows} rows of numbers: {', '.join(others)}" * bool(others)
+    lines = np.arange(1, rows + 1)
+    return Table(names, units, columns, lines, notes, CONVENTION, left_out=left_out)
 
 
 def cells_of(values: NDArray) -> Cells:

@@ -7,6 +7,8 @@ from hevopt.driving.cycle import COLUMNS as CYCLE_COLUMNS
 from hevopt.files.shown import printable
 from hevopt.units import unit_named
 
+# A unit of time that is none: hours, minutes and seconds in one number, with or without parts of a second.
+PACKED_CLOCK = "hhmmss"
 _NAME_MAX = 80
 _BRACKETS = re.compile(r"(.*?)[\s_]*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})")
 _SLASHED = re.compile(r"(.+?)\s+/\s*(\S+)|([^\s/]+)/(\S+/\S+|rpm|min-1|%|N·?m)")

@@ -29,6 +29,8 @@ class Table:
 
     also: by column, its names in further header rows
     unclear: by column, why its numbers may mean two things, or ''
+    left_out: what else the file holds that is no column of it, or ''
+    sampled: by column, the rows that hold a value of it, where each row is one column's; see signals.py
     """
 
     names: list[str]
@@ -39,6 +41,8 @@ class Table:
     units_source: str = "units row"
     also: list[tuple[str, ...]] | None = None
     unclear: list[str] | None = None
+    left_out: str = ""
+    sampled: list[NDArray[np.int64]] | None = None
 
 
 def table_of(path: Path, rows: Iterable[Row], *, padded: bool) -> Table:

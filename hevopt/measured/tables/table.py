@@ -45,6 +45,7 @@ class Column:
     against: another unit that the file states, and how; fixed: whether the cells themselves carry the unit
     clock: "date", "time of day" or "moment" where the cells are such; also: names in further header rows
     unclear: why the numbers could mean two things, or ''
+    sampled: rows that hold a value of it, where each row of the table is one column's; None elsewhere
     """
 
     name: str
@@ -59,16 +60,21 @@ class Column:
     clock: str = ""
     also: tuple[str, ...] = ()
     unclear: str = ""
+    sampled: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """A file's table. lines: (row,) line or sheet row of every data row; notes: what was assumed on reading."""
+    """A file's table. lines: (row,) line or sheet row of every data row; notes: what was assumed on reading.
+
+    left_out: what else the file holds that is no column of it, or ''; one of the notes too
+    """
 
     path: Path
     columns: tuple[Column, ...]
     lines: NDArray[np.int64]
     notes: tuple[str, ...]
+    left_out: str = ""
 
 
 def read_measured(
@@ -88,7 +94,8 @@ def read_measured(
         ) from None
     columns = _columns(shown_path, table)
     table.lines.flags.writeable = False
-    return Measured(shown_path, tuple(columns), table.lines, tuple(table.notes))
+    notes = (*table.notes, table.left_out) if table.left_out else tuple(table.notes)
+    return Measured(shown_path, tuple(columns), table.lines, notes, table.left_out)
 
 
 def _contents(path: Path, shown_path: Path) -> bytes:
@@ -158,7 +165,7 @@ def _columns(path: Path, table: Table) -> list[Column]:
         unclear = table.unclear[i] if table.unclear else ""
         column = Column(
             name, unit, values, source, tuple(cells.strange), cells.strange_count, cells.words, against,
-            also=also, unclear=unclear,
+            also=also, unclear=unclear, sampled=table.sampled[i] if table.sampled else None,
         )  # fmt: skip
         column = _carrying_units(column, cells, table)
         column.values.flags.writeable = False

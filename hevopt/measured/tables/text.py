@@ -5,12 +5,15 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterator
+from itertools import chain, islice
 from pathlib import Path
 
 from hevopt.errors import DataError
 from hevopt.measured.tables.header import split_otherwise
 from hevopt.measured.tables.names import unit_in_cell
 from hevopt.measured.tables.rows import ROWS_MAX, Row, Table, numeric_share, runs, table_of
+from hevopt.measured.tables.signals import is_signals_header, signals_table
+from hevopt.measured.tables.vbo import vbo_table
 
 _LINES_MAX = ROWS_MAX + 100_000
 _LINE_MAX = 1_000_000
@@ -36,13 +39,20 @@ def text_table(path: Path, contents: bytes) -> Table:
     """The table in the bytes of a text file."""
     text, encoding = _decoded(path, contents)
     lines = _lines(path, text)
+    if table := vbo_table(path, lines):
+        return table
     kept, comments, blank = _without_comments(_joined(lines))
     separator = _separator([line for _, line in kept[:_HEAD_LINES] if len(line) < _HEAD_LINE_MAX])
     if separator != "\t":
         blank = sorted(blank + [number for number, line in kept if line.isspace()])
         kept = [(number, line) for number, line in kept if not line.isspace()]
     kept = _with_commented_header(kept, comments, separator)
-    table = table_of(path, _rows(path, kept, separator), padded=False)
+    rows = _rows(path, kept, separator)
+    first = list(islice(rows, 1))
+    if first and is_signals_header(first[0][1]):
+        table = signals_table(path, first[0], rows)
+    else:
+        table = table_of(path, chain(first, rows), padded=False)
     notes = [f"{encoding}, separated by {_SEPARATORS[separator]}"]
     if comments:
         notes.append(f"comments: {runs([number for number, _ in comments])}")

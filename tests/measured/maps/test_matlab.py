@@ -179,3 +179,11 @@ def test_numbers_that_no_bench_writes_raise_no_warning(tmp_path):
     curve = {"max_torque_nm": FULL_NM * [1, 1e-310, 1, 1]}
     report = coverage(engine(tmp_path, WHOLE | {"fuel_gps": fuel} | curve))
     assert "holes: 1: 3000 rpm, 120 Nm" in report
+
+
+def test_what_is_no_column_is_named_where_a_column_is_missing(tmp_path):
+    variables = {"speed_rpm": SPEED_RPM, "moment": TORQUE_NM}
+    with pytest.raises(DataError) as error:
+        engine(tmp_path, variables)
+    said = "columns found: moment; left out, not of 5 rows of numbers: speed_rpm (1 x 4)"
+    assert str(error.value).endswith(said)
