@@ -46,7 +46,6 @@ LONG = {
     "bounds._lower_dp_kernels.lower_backward": "one recursion, compiled as a whole",
     "bounds.step_prices._lp_part": "one linear program, set up as its docstring says",
     "measured.maps.machine.import_machine": "one import from file to map, in its steps",
-    "studies.comparison.compare": "the signature that users call, and its settings",
 }
 MODULES = sorted(PACKAGE.rglob("*.py"))
 

@@ -1,7 +1,6 @@
 """Study files of compare and sweep checked in full, with every file that they name."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +22,10 @@ from hevopt.files.lookup import find, shipped_names
 from hevopt.files.shown import printable
 from hevopt.files.toml import read_contents
 from hevopt.strategies import strategy_named
-from hevopt.studies.comparison import check_horizon, check_one_of_each_name
-from hevopt.studies.settings import (
-    KEYS,
-    NAMES_MAX,
-    CompareFile,
-    beside_study,
-    cars_of,
-    changes_in,
-    read_study,
-)
+from hevopt.studies.cars import cars_of
+from hevopt.studies.settings import KEYS, NAMES_MAX, CompareFile, study_of
+from hevopt.studies.solved import EVERY, check_horizon
+from hevopt.studies.study_file import beside_study, changes_in, read_study
 from hevopt.sweeps.plan.study_file import study_and_faults
 
 
@@ -49,7 +42,7 @@ def compare_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[lis
         for name in names(key)[:NAMES_MAX]:
             faults += _named_faults(path, key, name, wanted)
     for name in names("strategies"):
-        if name != "all":
+        if name != EVERY:
             faults += tried(path, "strategies", lambda name=name: strategy_named(name))
     cars = names("architectures")
     good = not faults
@@ -61,7 +54,7 @@ def compare_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[lis
         in_set = _set_faults(path, changes, cars)
         faults += in_set
         if good:
-            if names("strategies") != ["all"]:
+            if names("strategies") != [EVERY]:
                 faults += tried(
                     path,
                     "strategies",
@@ -95,19 +88,18 @@ def _named_faults(study: Path, key: str, name: str, wanted: str) -> list[str]:
 def _settings_faults(path: Path, changes: Mapping[str, Any]) -> list[str]:
     """Faults that settings have in the cars, the ones of the battery's charge together, the others one by one."""
     try:
-        settings = read_study(path)
+        given = read_study(path)
     except DataError as error:
         return error.listed
     groups: dict[str, list[str]] = {}
-    for name in KEYS.keys() & settings.given.keys():
+    for name in KEYS.keys() & given.keys():
         groups.setdefault(name.partition("_")[0], []).append(name)
-    shared = {name: value for name, value in settings.given.items() if name not in KEYS}
+    shared = {n: value for n, value in given.items() if n not in KEYS} | {"set": changes}
     faults = []
     for names in ([], *(groups[first] for first in sorted(groups))):
-        given = shared | {name: settings.given[name] for name in names}
-        part = replace(settings, given=given, changes=changes)
+        part = study_of(shared | {name: given[name] for name in names})
         faults += tried(
-            path, "settings", lambda part=part: check_one_of_each_name(cars_of(part).cars)
+            path, "settings", lambda part=part: cars_of(part.architectures, part.settings)
         )
     return list(dict.fromkeys(faults))
 

@@ -13,42 +13,47 @@ if TYPE_CHECKING:
     from hevopt.driving.cycle import Cycle
     from hevopt.pages.comparison.collect import Collector
     from hevopt.problem.problem import Plan, Trajectory
+    from hevopt.studies.cars import Cars
     from hevopt.studies.case import Case
     from hevopt.studies.comparison import Comparison
     from hevopt.studies.rows import Row
-    from hevopt.studies.settings import Cars, Settings
+    from hevopt.studies.settings import Settings
 
-_SHARED = {"nox_weight": 0.0, "allow_shortfall": False, "free_gear": False, "refine": False}
+# Settings that results name beside what was changed in the cars.
+_NAMED = ("nox_weight", "allow_shortfall", "free_gear", "refine", "horizon_s")
 
 
 @dataclass(frozen=True)
 class Job:
-    """Cars on a cycle, and the settings that they are solved with."""
+    """Cars on a cycle, the settings that they are solved with, and the study file, if they come from one."""
 
     cars: "Cars"
     trace: "Cycle"
     settings: "Settings"
+    file: Path | None = None
 
     @cached_property
     def inputs(self) -> dict[str, str]:
         """File as it was read -> its digest."""
         from hevopt.studies.provenance import files_digests
 
-        own = [self.settings.file] if self.settings.file is not None else []
-        return dict(files_digests(self.cars.cars, [self.trace], own))
+        return dict(files_digests(self.cars.cars, [self.trace], self.others))
+
+    @property
+    def others(self) -> list[Path]:
+        """Files read beside those of cars and cycle."""
+        return [] if self.file is None else [self.file]
 
     @cached_property
     def about(self) -> dict[str, Any]:
         """What a result comes from: digests of the files read, versions, and the settings made."""
         from hevopt.studies.provenance import changes_shown, digests_shown, versions
 
-        settings = self.settings
         return {
             "inputs": digests_shown(self.inputs),
             "versions": versions(),
             "settings": {
-                **{name: settings.get(name, default) for name, default in _SHARED.items()},
-                "horizon_s": settings.get("horizon_s", None),
+                **{name: getattr(self.settings, name) for name in _NAMED},
                 "changes": changes_shown(self.cars.changes),
                 "left_out": self.cars.left_out,
             },
@@ -153,7 +158,7 @@ class Files:
             comparison,
             command_line(),
             changes=job.changed(),
-            others=[job.settings.file] if job.settings.file is not None else [],
+            others=job.others,
             published=job.is_study,
         )
         results, failures = with_studies(

@@ -6,37 +6,11 @@ from typing import Annotated, Any
 
 import typer
 
+from hevopt.commands.terminal import listed
 from hevopt.errors import DataError
 from hevopt.files.shown import shown
 
 CycleOption = Annotated[str | None, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
-NoxOption = Annotated[
-    float | None,
-    typer.Option("--nox-weight", help="kg of fuel that a kg of NOx counts (ecms, dp, bound)."),
-]
-ShortfallOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--allow-shortfall/--no-allow-shortfall",
-        help="Drive on where the car cannot follow, and mark the rows.",
-    ),
-]
-GearOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--free-gear/--no-free-gear", help="The engine's gear is a control, not the cycle's."
-    ),
-]
-RefineOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--refine/--no-refine", help="Add torque levels around dp's plan until its cost settles."
-    ),
-]
-HorizonOption = Annotated[
-    float | None,
-    typer.Option("--horizon", help="Preview of the predictive strategies, s (default 20)."),
-]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead.")]
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
 
@@ -45,11 +19,22 @@ def _number(option: str, text: str) -> Any:
     return Annotated[float | None, typer.Option(option, help=text)]
 
 
-# Setting of a study file -> its option.
+def _flag(option: str, text: str) -> Any:
+    return Annotated[bool | None, typer.Option(f"--{option}/--no-{option}", help=text)]
+
+
+# Field of studies.settings.Settings -> its option; a test holds the two together.
 SETTINGS: dict[str, Any] = {
-    "nox_weight": NoxOption,
-    "allow_shortfall": ShortfallOption,
-    "free_gear": GearOption,
+    "strategies": Annotated[
+        str | None, typer.Option("--strategies", help="Names, separated by commas, or all.")
+    ],
+    "nox_weight": _number("--nox-weight", "kg of fuel that a kg of NOx counts (ecms, dp, bound)."),
+    "allow_shortfall": _flag(
+        "allow-shortfall", "Drive on where the car cannot follow, and mark the rows."
+    ),
+    "free_gear": _flag("free-gear", "The engine's gear is a control, not the cycle's."),
+    "refine": _flag("refine", "Add torque levels around dp's plan until its cost settles."),
+    "horizon_s": _number("--horizon", "Preview of the predictive strategies, s (default 20)."),
     "soc_start": _number("--soc-start", "State of charge at the start, 0 to 1."),
     "soc_min": _number("--soc-min", "Lower end of the window of the state of charge."),
     "soc_max": _number("--soc-max", "Upper end of that window."),
@@ -61,7 +46,7 @@ SETTINGS: dict[str, Any] = {
     "mass_kg": _number("--mass", "Mass of the car without the parts of the hybrid, kg."),
     "start_cost_g": _number("--start-cost", "Fuel of one engine start, g."),
     "shift_cost_g": _number("--shift-cost", "Fuel that a change of a free gear counts, g."),
-    "set": Annotated[
+    "changes": Annotated[
         list[str] | None,
         typer.Option(
             "--set",
@@ -73,36 +58,46 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for every setting in place of its parameter `given`, a dict of those given."""
-    own = inspect.signature(command, eval_str=True).parameters
-    parameters = []
-    for parameter in own.values():
-        kind = inspect.Parameter.KEYWORD_ONLY
-        if parameter.name == "given":
-            parameters += [
-                inspect.Parameter(name, kind, default=None, annotation=option)
-                for name, option in SETTINGS.items()
-            ]
-        else:
-            parameters.append(parameter.replace(kind=kind))
+def takes_settings(*without: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Makes a command with an option for every setting but some in place of its parameter `given`.
 
-    def with_options(**values: Any) -> None:
-        given = {name: value for name in SETTINGS if (value := values.pop(name)) is not None}
-        command(given=_as_in_a_file(given), **values)
+    given: those that were, as a study file has them
+    """
+    options = {name: option for name, option in SETTINGS.items() if name not in without}
 
-    with_options.__name__, with_options.__doc__ = command.__name__, command.__doc__
-    with_options.__signature__ = inspect.Signature(parameters)
-    with_options.__annotations__ = {p.name: p.annotation for p in parameters}
-    return with_options
+    def taking(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command, eval_str=True).parameters
+        parameters = []
+        for parameter in own.values():
+            kind = inspect.Parameter.KEYWORD_ONLY
+            if parameter.name == "given":
+                parameters += [
+                    inspect.Parameter(name, kind, default=None, annotation=option)
+                    for name, option in options.items()
+                ]
+            else:
+                parameters.append(parameter.replace(kind=kind))
+
+        def with_options(**values: Any) -> None:
+            given = {name: value for name in options if (value := values.pop(name)) is not None}
+            command(given=_as_in_a_file(given), **values)
+
+        with_options.__name__, with_options.__doc__ = command.__name__, command.__doc__
+        with_options.__signature__ = inspect.Signature(parameters)
+        with_options.__annotations__ = {p.name: p.annotation for p in parameters}
+        return with_options
+
+    return taking
 
 
 def _as_in_a_file(given: dict[str, Any]) -> dict[str, Any]:
-    from hevopt.studies.settings import assignments
+    from hevopt.studies.study_file import assignments
 
     values = dict(given)
-    if "set" in values:
-        values["set"] = assignments(values["set"])
+    if "strategies" in values:
+        values["strategies"] = listed(values["strategies"])
+    if "changes" in values:
+        values["set"] = assignments(values.pop("changes"))
     if "soc_end" in values:
         try:
             values["soc_end"] = float(values["soc_end"])

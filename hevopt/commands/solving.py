@@ -7,20 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from hevopt.commands.options import (
-    ArchitectureArgument,
-    CycleOption,
-    HorizonOption,
-    JsonOption,
-    RefineOption,
-    takes_settings,
-)
+from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOption, takes_settings
 from hevopt.commands.terminal import Progress, listed, show, write
 
 _OPTIONS = "the command line"
 
 
-@takes_settings
+@takes_settings()
 def compare(
     given: dict[str, Any],
     study_path: Annotated[
@@ -33,12 +26,6 @@ def compare(
     architectures: Annotated[
         str | None, typer.Option("--architectures", help="Names or files, separated by commas.")
     ] = None,
-    strategies: Annotated[
-        str | None,
-        typer.Option("--strategies", help="Names, separated by commas, or all."),
-    ] = None,
-    refine: RefineOption = None,
-    horizon: HorizonOption = None,
     json: JsonOption = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Write the rows to this .csv, .parquet or .json.")
@@ -69,34 +56,22 @@ def compare(
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies import comparison as study
-    from hevopt.studies.settings import Settings, cars_of, read_study, settings_of
+    from hevopt.studies.cars import cars_of
+    from hevopt.studies.settings import given_of, joined, study_of
+    from hevopt.studies.study_file import read_study
 
-    named = {
-        "cycle": cycle,
-        "architectures": listed(architectures),
-        "strategies": listed(strategies),
-        "refine": refine,
-        "horizon_s": horizon,
-    }
+    named = {"cycle": cycle, "architectures": listed(architectures)}
     options = given | {name: value for name, value in named.items() if value is not None}
-    settings = Settings() if study_path is None else read_study(study_path)
-    settings = settings.joined(settings_of(_OPTIONS, options))
-    job = Job(cars_of(settings), load_cycle(settings.get("cycle", "nedc")), settings)
+    below = {"set": {}} if study_path is None else read_study(study_path)
+    asked = study_of(joined(below, given_of(_OPTIONS, options)))
+    cars = cars_of(asked.architectures, asked.settings)
+    job = Job(cars, load_cycle(asked.cycle), asked.settings, study_path)
     files = Files(out, steps, page, save, fronts, effects)
     files.check(job)
-    compared = partial(
-        study.compare,
-        architectures=job.cars.cars,
-        strategies=settings.get("strategies", None),
-        nox_weight=settings.get("nox_weight", 0.0),
-        allow_shortfall=settings.get("allow_shortfall", False),
-        free_gear=settings.get("free_gear", False),
-        refine=settings.get("refine", False),
-        horizon_s=settings.get("horizon_s", None),
-    )
+    compared = partial(study.compare_cars, cars.cars, settings=asked.settings)
     say_how_long(job.trace, compared)
     with Progress() as progress:
-        comparison = compared(job.trace, progress=progress, observe=files.observe)
+        comparison = compared(job.trace, watch=study.Watch(progress, files.observe))
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
     show_comparison(job, comparison, json=json)
     lines, of_files = files.write(job, comparison)
@@ -109,7 +84,7 @@ def compare(
         raise typer.Exit(max(error.exit_status for error in failures.values()))
 
 
-@takes_settings
+@takes_settings("strategies")
 def run(
     given: dict[str, Any],
     architecture: ArchitectureArgument,
@@ -122,8 +97,6 @@ def run(
             help="Write inputs, powers and losses per step to this .csv, .parquet or .json.",
         ),
     ] = None,
-    refine: RefineOption = None,
-    horizon: HorizonOption = None,
     json: JsonOption = False,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
@@ -133,40 +106,31 @@ def run(
     from hevopt.files.writing import check_outs
     from hevopt.output import file_tables as outputs
     from hevopt.output import terminal_tables as report
-    from hevopt.strategies import strategy_named
     from hevopt.studies import comparison as study
+    from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
-    from hevopt.studies.settings import cars_of, settings_of
+    from hevopt.studies.settings import given_of, study_of
+    from hevopt.studies.solved import check_horizon, run_case
 
-    strategy_named(strategy)
-    study.check_horizon(horizon, [strategy])
-    named = {"refine": refine, "horizon_s": horizon}
-    options = given | {name: value for name, value in named.items() if value is not None}
-    settings = settings_of(_OPTIONS, options)
-    job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
+    settings = study_of(given_of(_OPTIONS, given)).settings
+    check_horizon(settings.horizon_s, [strategy])
+    job = Job(cars_of([architecture], settings), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
     if out is not None:
         check_outs({"--out": out}, job.inputs)
         outputs.check_table_file(out)
-    nox_weight = settings.get("nox_weight", 0.0)
-    prepared = partial(
-        prepare,
-        car,
-        nox_weight=nox_weight,
-        allow_shortfall=settings.get("allow_shortfall", False),
-        refine=settings.get("refine", False),
-    )
-    say_how_long(trace, lambda piece: study.run_case(prepared(piece), strategy, horizon))
+    prepared = partial(prepare, car, settings=settings)
+    say_how_long(trace, lambda piece: run_case(prepared(piece), strategy, settings.horizon_s))
     with Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
         case = prepared(trace)
         progress(f"{car.name}: {strategy}", 0, 1)
-        row, plan, trajectory = study.run_case(case, strategy, horizon)
+        row, plan, trajectory = run_case(case, strategy, settings.horizon_s)
     comparison = study.Comparison(
         trace.name,
         [row],
         {},
-        nox_weight,
+        settings.nox_weight,
         end_asked=study.end_asked([car]),
         lost_proofs=study.lost_proofs(case),
     )
@@ -185,7 +149,7 @@ def run(
         write(f"trajectory written to {out}")
 
 
-@takes_settings
+@takes_settings("strategies", "refine", "horizon_s")
 def table(
     given: dict[str, Any],
     architecture: ArchitectureArgument,
@@ -198,21 +162,21 @@ def table(
     from hevopt.files.writing import check_outs
     from hevopt.output.control_table import write_table
     from hevopt.powertrain.powertrain import build_problem
+    from hevopt.studies.cars import cars_of
     from hevopt.studies.case import require_nox
-    from hevopt.studies.settings import cars_of, settings_of
+    from hevopt.studies.settings import given_of, study_of
 
-    settings = settings_of(_OPTIONS, given)
-    job = Job(cars_of(settings, [architecture]), load_cycle(cycle), settings)
+    settings = study_of(given_of(_OPTIONS, given)).settings
+    job = Job(cars_of([architecture], settings), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
     check_outs({"--out": out}, job.inputs)
-    nox_weight = settings.get("nox_weight", 0.0)
-    if nox_weight > 0:
-        require_nox(car, f"nox_weight {nox_weight:g}")
+    if settings.nox_weight > 0:
+        require_nox(car, f"nox_weight {settings.nox_weight:g}")
     problem = build_problem(
         car,
         trace,
-        nox_weight=nox_weight,
-        allow_shortfall=settings.get("allow_shortfall", False),
+        nox_weight=settings.nox_weight,
+        allow_shortfall=settings.allow_shortfall,
     )
     write_table(out, problem)
     steps, controls = problem.table.fuel_kg.shape

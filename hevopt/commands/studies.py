@@ -10,10 +10,9 @@ from hevopt.commands.options import (
     ArchitectureArgument,
     CycleOption,
     JsonOption,
-    RefineOption,
     takes_settings,
 )
-from hevopt.commands.terminal import Progress, listed, show, write
+from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
@@ -21,13 +20,14 @@ if TYPE_CHECKING:
     from hevopt.driving.cycle import Cycle
     from hevopt.pages.comparison.results import Results
     from hevopt.problem.problem import Problem
+    from hevopt.studies.cars import Cars
     from hevopt.studies.sensitivity import Effect
-    from hevopt.studies.settings import Cars, Settings
+    from hevopt.studies.settings import Settings
 
 _OPTIONS = "the command line"
 
 
-@takes_settings
+@takes_settings("strategies", "horizon_s")
 def pareto(
     given: dict[str, Any],
     architecture: ArchitectureArgument,
@@ -46,7 +46,6 @@ def pareto(
     strategy: Annotated[
         str, typer.Option("--strategy", help="Strategy whose plans are the points.")
     ] = "dp",
-    refine: RefineOption = None,
     json: JsonOption = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Write points and outer front to this CSV file.")
@@ -55,15 +54,16 @@ def pareto(
     """Fuel against NOx: plans over the weight on NOx, and the certified front that none can cross."""
     from hevopt.commands.studies_view import front_notes, front_table, write_front
     from hevopt.driving.cycle import load_cycle
-    from hevopt.studies.settings import cars_of, settings_of
+    from hevopt.studies.cars import cars_of
+    from hevopt.studies.settings import given_of, study_of
 
     if "nox_weight" in given:
         raise DataError("--nox-weight: a front has many weights; give them as --weights 0,10,100")
     if weights is not None and points is not None:
         raise DataError("--weights and --points: choose one, the weights or how many to choose")
     chosen = None if weights is None else _numbers("--weights", weights)
-    settings = settings_of(_OPTIONS, _with_refine(given, refine))
-    cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
+    settings = study_of(given_of(_OPTIONS, given)).settings
+    cars, trace = cars_of([architecture], settings), load_cycle(cycle)
     if out is not None:
         _check_csv(out, [*cars.cars[0].files, *filter(None, [trace.source])])
     with Progress() as progress:
@@ -82,32 +82,28 @@ def pareto(
         write(_json(figures | {"shortfall_steps": shortfall_steps} | _about(cars, trace)))
         return
     show(front_table(figures))
-    write(front_notes(figures, cars.cars[0], shortfall_steps, refined=bool(refine)))
+    write(front_notes(figures, cars.cars[0], shortfall_steps, refined=settings.refine))
     if out is not None:
         write(f"front written to {out}")
 
 
-@takes_settings
+@takes_settings("horizon_s")
 def sensitivity(
     given: dict[str, Any],
     architecture: ArchitectureArgument,
     cycle: CycleOption = "nedc",
-    strategies: Annotated[
-        str | None,
-        typer.Option("--strategies", help="Names, separated by commas (default: dp and the rule)."),
-    ] = None,
-    refine: RefineOption = None,
     json: JsonOption = False,
 ) -> None:
     """How fuel and NOx move with mass, resistances, losses, auxiliaries, battery and NOx map."""
     from hevopt.commands.studies_view import SHORTFALL_NOTE, effects_notes, effects_table
     from hevopt.driving.cycle import load_cycle
-    from hevopt.studies.settings import cars_of, settings_of
+    from hevopt.studies.cars import cars_of
+    from hevopt.studies.settings import given_of, study_of
 
-    settings = settings_of(_OPTIONS, _with_refine(given, refine))
-    cars, trace = cars_of(settings, [architecture]), load_cycle(cycle)
+    settings = study_of(given_of(_OPTIONS, given)).settings
+    cars, trace = cars_of([architecture], settings), load_cycle(cycle)
     with Progress() as progress:
-        effects = _effects(cars.cars[0], cars, trace, settings, progress, listed(strategies))
+        effects = _effects(cars.cars[0], cars, trace, settings, progress, settings.strategies)
     if json:
         found = {"cycle": trace.name, "sensitivity": [effect.as_dict() for effect in effects]}
         write(_json(found | _about(cars, trace)))
@@ -115,7 +111,7 @@ def sensitivity(
     for strategy in dict.fromkeys(effect.strategy for effect in effects):
         show(effects_table([effect for effect in effects if effect.strategy == strategy], trace))
     write(effects_notes(effects))
-    if settings.get("allow_shortfall", False):
+    if settings.allow_shortfall:
         write(SHORTFALL_NOTE)
 
 
@@ -209,13 +205,9 @@ def _problem(car: "Architecture", trace: "Cycle", settings: "Settings") -> "Prob
     from hevopt.powertrain.powertrain import build_problem
     from hevopt.studies.case import prepare
 
-    allow_shortfall = settings.get("allow_shortfall", False)
-    if not settings.get("refine", False):
-        return build_problem(car, trace, allow_shortfall=allow_shortfall)
-    weight = settings.get("nox_weight", 0.0)
-    return prepare(
-        car, trace, nox_weight=weight, allow_shortfall=allow_shortfall, refine=True
-    ).problem
+    if settings.refine:
+        return prepare(car, trace, settings).problem
+    return build_problem(car, trace, allow_shortfall=settings.allow_shortfall)
 
 
 def _effects(
@@ -226,23 +218,9 @@ def _effects(
     progress: Progress,
     strategies: Sequence[str] | None = None,
 ) -> list["Effect"]:
-    from hevopt.studies.sensitivity import sensitivities
+    from hevopt.studies.sensitivity import effects_on
 
-    free = {"gear": "free"} if car.gear == "free" else {}
-    return sensitivities(
-        car.source,
-        trace,
-        strategies,
-        nox_weight=settings.get("nox_weight", 0.0),
-        allow_shortfall=settings.get("allow_shortfall", False),
-        refine=settings.get("refine", False),
-        base={**cars.changes[car.name], **free},
-        progress=progress,
-    )
-
-
-def _with_refine(given: dict[str, Any], refine: bool | None) -> dict[str, Any]:
-    return given if refine is None else given | {"refine": refine}
+    return effects_on(car, cars.changes[car.name], trace, settings, strategies, progress)
 
 
 def _numbers(option: str, text: str) -> list[float]:

@@ -33,6 +33,7 @@ _NEEDED = {
     "model_type": "a table [{place}] is needed",
     "dict_type": "a table [{place}] is needed",
     "list_type": "a list [...] is needed",
+    "tuple_type": "a list [...] is needed",
     "float_type": "a number is needed",
     "finite_number": "a finite number is needed",
     "int_type": "a whole number is needed",

@@ -13,6 +13,7 @@ from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_problem, torques_o
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import dp
+from hevopt.studies.settings import Settings
 
 # Levels are added until the cost moves by less than this share.
 _REFINED_ENOUGH = 2e-4
@@ -32,21 +33,19 @@ class Case:
     dp_s: float
 
 
+_DEFAULTS = Settings()
+
+
 def prepare(
-    car: Architecture,
-    cycle: Cycle,
-    *,
-    levels: int = TORQUE_LEVELS,
-    nox_weight: float = 0.0,
-    allow_shortfall: bool = False,
-    refine: bool = False,
+    car: Architecture, cycle: Cycle, settings: Settings = _DEFAULTS, *, levels: int = TORQUE_LEVELS
 ) -> Case:
     """The problem of a car on a cycle, solved by dynamic programming and certified.
 
-    Raises UnknownNoxError for a weight on NOx where the engine has no data on it.
-    refine: add torque levels around the plan, closer each time, until its cost moves by less than 0.02 %; plans
-    and certificate are then those of the table with the added levels.
+    Of the settings it takes nox_weight, allow_shortfall and refine: then torque levels are added around the plan,
+    closer each time, until its cost moves by less than 0.02 %; plans and certificate are those of the table with
+    the added levels. Raises UnknownNoxError for a weight on NOx where the engine has no data on it.
     """
+    nox_weight = settings.nox_weight
 
     def case_with(around: Around | None) -> Case:
         problem = build_problem(
@@ -54,7 +53,7 @@ def prepare(
             cycle,
             levels=levels,
             nox_weight=nox_weight,
-            allow_shortfall=allow_shortfall,
+            allow_shortfall=settings.allow_shortfall,
             around=around,
         )
         return dp_case(car, cycle, problem)
@@ -63,7 +62,7 @@ def prepare(
         require_nox(car, f"nox_weight {nox_weight:g}")
     case = case_with(None)
     share = 0.5 / (levels - 1)
-    for _ in range(_REFINEMENTS_MAX if refine else 0):
+    for _ in range(_REFINEMENTS_MAX if settings.refine else 0):
         before = case
         around = Around(torques_of(case.dp_trajectory, case.problem.table), share)
         case = case_with(around)

@@ -1,25 +1,33 @@
 """The study: run strategies on architectures over one cycle, and collect a row for each."""
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from math import isfinite
+from dataclasses import dataclass, field, replace
+from numbers import Real
 from pathlib import Path
-from time import perf_counter
-from typing import Any
+from types import NoneType
+from typing import Any, NamedTuple, Unpack, get_args
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.car_files.load import load_architecture
-from hevopt.driving.cycle import DISTANCE_MIN_M, Cycle, load_cycle, shipped_cycles
-from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError, UnknownNoxError
-from hevopt.files.lookup import shipped_names
-from hevopt.powertrain.powertrain import build_problem
+from hevopt.driving.cycle import DISTANCE_MIN_M, Cycle, load_cycle
+from hevopt.errors import (
+    DataError,
+    HevoptError,
+    InfeasibleError,
+    SolverError,
+    UnknownNoxError,
+    unknown_name,
+)
+from hevopt.files.shown import printable, shown
 from hevopt.problem.problem import Plan, Problem, Trajectory
-from hevopt.problem.simulation import simulate
-from hevopt.strategies import STRATEGIES, fitting, strategy_named
-from hevopt.studies.case import Case, prepare, require_nox
-from hevopt.studies.rows import Row, against_reference, failed_row, row_of
+from hevopt.strategies import strategy_named
+from hevopt.studies.cars import cars_of
+from hevopt.studies.case import Case, prepare
+from hevopt.studies.rows import Row, against_reference, failed_row
+from hevopt.studies.settings import Keywords, Settings, settings_from
+from hevopt.studies.solved import check_horizon, run_case, strategies_for
 
 _FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 
@@ -31,6 +39,7 @@ class Comparison:
     reference: the row that changes are against, None where there are none
     end_asked: car -> state of charge asked at the end, of those where it is another than the start's
     lost_proofs: architecture and kind of proof -> why it was tried and not found
+    left_out: settings that have no meaning for some of the cars, and why
     """
 
     cycle: str
@@ -41,71 +50,98 @@ class Comparison:
     free_gear: bool = False
     end_asked: Mapping[str, float] = field(default_factory=dict)
     lost_proofs: Mapping[str, str] = field(default_factory=dict)
+    left_out: Sequence[str] = ()
+
+
+class Watch(NamedTuple):
+    """Who is told while a comparison runs.
+
+    progress: what comes next, and how many cases of how many are done
+    observe: every solved case, its row (no reference yet), plan and trajectory
+    """
+
+    progress: Callable[[str, int, int], None] = lambda text, done, total: None
+    observe: Callable[[Case, Row, Plan, Trajectory], None] = lambda *solved: None
 
 
 def solve(problem: Problem, strategy: str = "dp", **settings: Any) -> Plan:
-    """The plan of a strategy by name, with the settings that its `solve` names."""
-    return strategy_named(strategy).solve(problem, **settings)
+    """The plan of a strategy by name, with the settings that its `solve` names.
+
+    Raises DataError for a name or a setting that there is not, with those that there are.
+    """
+    chosen = strategy_named(strategy).solve
+    _check_keywords(f"solve, {strategy}", chosen, settings)
+    return chosen(problem, **settings)
 
 
 def compare(
     cycle: Cycle | str | Path = "nedc",
-    architectures: Sequence[Architecture | str | Path] | None = None,
-    strategies: Sequence[str] | None = None,
+    architectures: Architecture | str | Path | Iterable[Architecture | str | Path] | None = None,
+    strategies: str | Sequence[str] | None = None,
     *,
-    nox_weight: float = 0.0,
-    allow_shortfall: bool = False,
-    free_gear: bool = False,
-    refine: bool = False,
-    horizon_s: float | None = None,
-    changes: Mapping[str, Any] | None = None,
-    progress: Callable[[str, int, int], None] = lambda text, done, total: None,
-    observe: Callable[[Case, Row, Plan, Trajectory], None] = lambda *solved: None,
+    progress: Callable[[str, int, int], None] | None = None,
+    observe: Callable[[Case, Row, Plan, Trajectory], None] | None = None,
+    **settings: Unpack[Keywords],
 ) -> Comparison:
     """Every strategy (by default the usual ones that fit) on every architecture (by default the shipped ones).
 
-    strategies: names, or ["all"] for every one that fits. free_gear: the engine's gear is a control.
-    refine: torque levels are added around dynamic programming's plan until its cost settles.
-    horizon_s: preview of the predictive strategies, by default their own.
-    changes: key path -> value in every architecture that is read, see load_architecture.
-    progress: called with what comes next, and how many cases of how many are done.
-    observe: called with every solved case, its row (no reference yet), plan and trajectory.
-    Where an engine has no NOx data, what asks for NOx is a failed row; UnknownNoxError if nothing else is asked.
+    cycle, architectures: names of shipped ones, files, or what was loaded; one, or several
+    strategies: one name or several; "all" for every one that fits
+    progress: called with what comes next, and how many cases of how many are done
+    observe: called with every solved case, its row (no reference yet), plan and trajectory
+    settings: the fields of `Settings`, such as nox_weight, refine or mass_kg
+    Raises DataError for a wrong name, file or setting, with those that there are. Where an engine has no NOx data,
+    what asks for NOx is a failed row; UnknownNoxError if nothing else is asked.
     """
-    if not isinstance(cycle, Cycle):
-        cycle = load_cycle(cycle)
+    names = [strategies] if isinstance(strategies, str) else strategies
+    told = settings_from("compare", settings, strategies=names)
+    if isinstance(architectures, Architecture | str | Path):
+        architectures = [architectures]
+    cars = cars_of(architectures, told)
+    drive = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
+    watch = {"progress": progress, "observe": observe}
+    found = compare_cars(
+        cars.cars,
+        drive,
+        told,
+        watch=Watch(**{n: who for n, who in watch.items() if who is not None}),
+    )
+    return replace(found, left_out=cars.left_out)
+
+
+_NOBODY = Watch()
+
+
+def compare_cars(
+    cars: Sequence[Architecture], cycle: Cycle, settings: Settings, *, watch: Watch = _NOBODY
+) -> Comparison:
+    """The strategies of the settings on cars in which the settings are made already; see `compare`."""
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
-    plans = _plans(architectures, strategies, free_gear, changes)
-    check_horizon(horizon_s, [name for _, names in plans for name in names])
+    plans = [(car, strategies_for(car, settings.strategies)) for car in cars]
+    check_horizon(settings.horizon_s, [name for _, names in plans for name in names])
     total = sum(len(names) for _, names in plans)
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
     lost: dict[str, str] = {}
     for car, wanted in plans:
         done = len(rows)
-        progress(f"{car.name}: table and certificate", done, total)
+        watch.progress(f"{car.name}: table and certificate", done, total)
         try:
-            case = prepare(
-                car,
-                cycle,
-                nox_weight=nox_weight,
-                allow_shortfall=allow_shortfall,
-                refine=refine,
-            )
+            case = prepare(car, cycle, settings)
         except _FAILURES as error:
             failures[car.name] = error
             rows += [failed_row(car, name, error) for name in wanted]
             continue
         lost |= lost_proofs(case)
         for n, name in enumerate(wanted):
-            progress(f"{car.name}: {name}", done + n, total)
+            watch.progress(f"{car.name}: {name}", done + n, total)
             try:
-                solved = run_case(case, name, horizon_s)
+                solved = run_case(case, name, settings.horizon_s)
                 rows.append(solved[0])
-                observe(case, *solved)
+                watch.observe(case, *solved)
             except _FAILURES as error:
                 failures[f"{car.name} {name}"] = error
                 rows.append(failed_row(car, name, error))
@@ -114,8 +150,35 @@ def compare(
         if unknown and len(unknown) == len(failures):
             raise unknown[0]
     rows, reference = against_reference(rows)
-    asked = end_asked(car for car, _ in plans)
-    return Comparison(cycle.name, rows, failures, nox_weight, reference, free_gear, asked, lost)
+    asked = end_asked(cars)
+    weight, free = settings.nox_weight, settings.free_gear
+    return Comparison(cycle.name, rows, failures, weight, reference, free, asked, lost)
+
+
+def _check_keywords(place: str, function: Callable[..., Any], given: Mapping[str, Any]) -> None:
+    """DataError where a function does not take a keyword, or needs one that is not given."""
+    own = list(inspect.signature(function).parameters.values())[1:]
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in own):
+        return
+    known = [parameter.name for parameter in own]
+    for name in given:
+        if name not in known:
+            if not known:
+                raise DataError(f"{place}: setting {printable(name)!r}; this strategy takes none")
+            raise DataError(f"{place}: {unknown_name('setting', printable(name), known)}")
+        _check_number(place, name, own[known.index(name)].annotation, given[name])
+    missing = [p.name for p in own if p.default is p.empty and p.name not in given]
+    if missing:
+        raise DataError(f"{place} needs {', '.join(missing)}; give it as a keyword")
+
+
+def _check_number(place: str, name: str, kind: Any, value: Any) -> None:
+    """DataError where a parameter is annotated as a number, or none, and the value is neither."""
+    kinds = set(get_args(kind) or [kind])
+    if kinds <= {int, float, bool, NoneType} and not (
+        isinstance(value, Real | np.bool_) or (value is None and NoneType in kinds)
+    ):
+        raise DataError(f"{place}: {name} = {shown(value)}; needed: a number")
 
 
 def lost_proofs(case: Case) -> dict[str, str]:
@@ -127,128 +190,6 @@ def lost_proofs(case: Case) -> dict[str, str]:
 def end_asked(cars: Iterable[Architecture]) -> dict[str, float]:
     """Car -> state of charge asked at the end, of those where it is another than the start's."""
     return {car.name: car.soc_end for car in cars if car.soc_end != car.soc_start}
-
-
-def check_horizon(horizon_s: float | None, strategies: Iterable[str]) -> None:
-    """DataError for a preview that none of the strategies takes."""
-    if horizon_s is None or any(strategy_named(name).previews for name in strategies):
-        return
-    able = ", ".join(name for name, strategy in STRATEGIES.items() if strategy.previews)
-    raise DataError(
-        f"horizon_s {horizon_s:g}: no strategy asked for looks ahead; add one that does ({able}), or leave it out"
-    )
-
-
-def _plans(
-    architectures: Sequence[Architecture | str | Path] | None,
-    strategies: Sequence[str] | None,
-    free_gear: bool,
-    changes: Mapping[str, Any] | None,
-) -> list[tuple[Architecture, list[str]]]:
-    """Every car, and the names of the strategies to run on it."""
-    every = list(strategies or ()) == ["all"]
-    if strategies is not None and not every:
-        _check_strategies(strategies)
-    cars = _cars(
-        shipped_names("architectures", ".toml") if architectures is None else architectures,
-        changes,
-    )
-    cars = [car.with_free_gear() for car in cars] if free_gear else cars
-    return [
-        (car, _usual(car, every=every) if every or not strategies else list(strategies))
-        for car in cars
-    ]
-
-
-def _usual(car: Architecture, *, every: bool) -> list[str]:
-    """What fits a car; without NOx data, no strategy that cuts it."""
-    names = fitting(car.functions, every=every)
-    return [name for name in names if car.engine.nox_known or not _cuts_nox(name)]
-
-
-def _cuts_nox(strategy: str) -> bool:
-    return "nox_cut" in strategy_named(strategy).needs
-
-
-def _cars(
-    wanted: Sequence[Architecture | str | Path], changes: Mapping[str, Any] | None
-) -> list[Architecture]:
-    """The architectures, no two of one name."""
-    cars = [a if isinstance(a, Architecture) else load_architecture(a, changes) for a in wanted]
-    if not cars:
-        raise DataError("no architecture given; name at least one, or leave the list out for all")
-    check_one_of_each_name(cars)
-    return cars
-
-
-def check_one_of_each_name(cars: Iterable[Architecture]) -> None:
-    """DataError where two cars have one name: rows are told apart by it."""
-    by_name: dict[str, Architecture] = {}
-    for car in cars:
-        if car.name in by_name:
-            raise DataError(
-                f"architecture {car.name} is given twice, in {by_name[car.name].source} and in "
-                f"{car.source}; leave one out, or change its name"
-            )
-        by_name[car.name] = car
-
-
-def _check_strategies(names: Sequence[str]) -> None:
-    if not names:
-        raise DataError("no strategy given; name at least one, or leave the list out for all")
-    for name in names:
-        strategy_named(name)
-        if list(names).count(name) > 1:
-            raise DataError(f"strategy {name} is given twice; name it once")
-
-
-def run_case(
-    case: Case, strategy: str, horizon_s: float | None = None
-) -> tuple[Row, Plan, Trajectory]:
-    """One strategy on a case: its row (no reference yet), plan and trajectory.
-
-    Raises UnknownNoxError for a strategy that cuts NOx where the engine has no data on it.
-    """
-    if _cuts_nox(strategy):
-        require_nox(case.car, f"strategy {strategy}")
-    plan, trajectory, solve_s = case.dp_plan, case.dp_trajectory, case.dp_s
-    if strategy != "dp":
-        settings = _settings(case, strategy, horizon_s)
-        began = perf_counter()
-        plan = strategy_named(strategy).solve(case.problem, **settings)
-        solve_s = perf_counter() - began
-        trajectory = simulate(case.problem, plan.control)
-    row = row_of(case, strategy, trajectory, solve_s)
-    for name, value in row.as_dict().items():
-        if isinstance(value, float) and not isfinite(value):
-            raise SolverError(
-                f"{case.car.name} {strategy}: {name} is {value}; the figures of {case.car.source} are "
-                "too far from those of a car"
-            )
-    return row, plan, trajectory
-
-
-def _settings(case: Case, strategy: str, horizon_s: float | None) -> dict[str, Any]:
-    """What a strategy is told beyond the problem: its preview, the shipped cycles but this one to learn from."""
-    chosen = strategy_named(strategy)
-    settings: dict[str, Any] = {}
-    if chosen.previews and horizon_s is not None:
-        settings["horizon_s"] = horizon_s
-    if chosen.learns:
-        weight = case.problem.nox_weight
-        settings["training"] = [
-            build_problem(case.car, other, nox_weight=weight, allow_shortfall=True)
-            for other in shipped_cycles()
-            if not _same_drive(other, case.cycle)
-        ]
-    return settings
-
-
-def _same_drive(one: Cycle, other: Cycle) -> bool:
-    """Whether two cycles are one drive, under whatever names."""
-    return np.array_equal(one.time_s, other.time_s) and np.array_equal(
-        one.speed_mps, other.speed_mps
-    )
 
 
 def steps_of(cycle: str | Path) -> int:

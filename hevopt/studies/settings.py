@@ -1,35 +1,23 @@
-"""Study files of `hevopt compare study.toml`: one TOML file from which a run is repeated.
+"""The settings of a comparison, once: keys of its study file, options and keywords all come from these fields.
 
-    cycle = "wltc_class3b"                  a name, or a path from the file
-    architectures = ["A", "./mine.toml"]    strategies = ["ecms", "dp"]
-    nox_weight = 0.0        allow_shortfall = false     free_gear = false     refine = false     horizon_s = 20
-    soc_start = 0.6         soc_min = 0.4               soc_max = 0.8         soc_end = "neutral"
-    auxiliaries_w = 400     mass_kg = 1350              start_cost_g = 0.2    shift_cost_g = 0.05
-    [set]                                   any key of an architecture or its components, by its path
-    machine.power_max_w = 2e4
-
-Every key may be left out. The command line has the same as options, which go first. Charge settings are for cars
-whose battery drives (any function beyond start_stop); those of A and B carry the electric load only, and keep their
-own. The cost of a shift is for cars whose gear is free.
+Charge settings are for cars whose battery drives (any function beyond start_stop); those of A and B carry the
+electric load only, and keep their own. The cost of a shift is for cars whose gear is free.
 """
 
-import re
-import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Annotated, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from numbers import Real
+from typing import Annotated, Any, Literal, NamedTuple, TypedDict, get_type_hints
 
-from pydantic import AfterValidator, BeforeValidator, Field
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, create_model
 
-from hevopt.car.architecture import Architecture
 from hevopt.car_files.fields import AuxiliaryPower, Mass, ShiftFuel, Soc, StartFuel
-from hevopt.car_files.load import COMPONENTS, load_architecture
-from hevopt.errors import DataError
-from hevopt.files.lookup import is_path, shipped_names
+from hevopt.car_files.load import COMPONENTS
+from hevopt.errors import DataError, unknown_name
 from hevopt.files.shown import printable, shown
-from hevopt.files.toml import FileModel, checked, read_contents
+from hevopt.files.toml import FileModel, checked
 
 NEUTRAL = "neutral"
 NAMES_MAX = 1000
@@ -44,12 +32,6 @@ KEYS = {
     "soc_max": "battery.soc.max",
     "soc_end": "battery.soc.end",
 }
-# Keys of files that are none of compare's, and where to give them instead.
-_NAME_OR_PATH = re.compile(r"[A-Za-z_./~][\w./~ -]*")
-_OTHER_FILES = {
-    "coupling": "an architecture; give the file with --architectures",
-    "parameters": "a study file of sweep; give the file to hevopt sweep",
-}
 
 
 def _soc_end(value: Any) -> Any:
@@ -59,7 +41,7 @@ def _soc_end(value: Any) -> Any:
     return value
 
 
-def _each_once(names: list[str]) -> list[str]:
+def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
     if not names:
         raise ValueError("name at least one, or leave it out for the usual ones")
     twice = [name for name, count in Counter(names).items() if count > 1]
@@ -68,189 +50,143 @@ def _each_once(names: list[str]) -> list[str]:
     return names
 
 
-_Names = Annotated[list[str], Field(max_length=NAMES_MAX), AfterValidator(_each_once)]
+Names = Annotated[
+    tuple[str, ...], Strict(False), Field(max_length=NAMES_MAX), AfterValidator(_each_once)
+]
+SocEnd = Annotated[float | Literal["neutral"], BeforeValidator(_soc_end)]
 
 
-class CompareFile(FileModel):
-    """What a comparison is made of; None for what is left to the default."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """How a comparison changes its cars and solves them. None: as the car's files, or the strategy, have it.
 
-    cycle: str | None = None
-    architectures: _Names | None = None
-    strategies: _Names | None = None
-    nox_weight: Annotated[float, Field(ge=0, le=1e6)] | None = None
-    allow_shortfall: bool | None = None
-    free_gear: bool | None = None
-    refine: bool | None = None
+    strategies: by name, ("all",) for every one that fits a car; None: the usual ones that fit
+    nox_weight: kg of fuel that a kg of NOx counts
+    allow_shortfall: drive on where a car cannot follow; free_gear: the engine's gear is a choice
+    refine: add torque levels around dynamic programming's plan until its cost settles
+    horizon_s: preview of the predictive strategies
+    soc_start, soc_min, soc_max, soc_end: state of charge at the start, its window, the least at the end ("neutral":
+    that of the start)
+    auxiliaries_w: electric load; mass_kg: the car without the parts of the hybrid
+    start_cost_g, shift_cost_g: fuel of an engine start, and what a change of a free gear counts
+    changes: key path -> value in every architecture that is read, the [set] of a study file
+    """
+
+    strategies: Names | None = None
+    nox_weight: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    allow_shortfall: bool = False
+    free_gear: bool = False
+    refine: bool = False
     horizon_s: Annotated[float, Field(ge=1e-3, le=1e6)] | None = None
     soc_start: Soc | None = None
     soc_min: Soc | None = None
     soc_max: Soc | None = None
-    soc_end: Annotated[float | str | None, BeforeValidator(_soc_end)] = None
+    soc_end: SocEnd | None = None
     auxiliaries_w: AuxiliaryPower | None = None
     mass_kg: Mass | None = None
     start_cost_g: StartFuel | None = None
     shift_cost_g: ShiftFuel | None = None
-    set: Annotated[dict[str, Any], Field(default_factory=dict)]
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """What a comparison is made of, the file and the command line together.
-
-    given: setting -> value, but for `set`; changes: key path -> value; file: the study file
-    """
-
-    given: Mapping[str, Any] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
-    file: Path | None = None
-
-    def get(self, name: str, default: Any) -> Any:
-        """A setting, or a default where it is not given."""
-        return self.given.get(name, default)
-
-    def joined(self, over: "Settings") -> "Settings":
-        """These settings with others on top."""
-        kept = {k: v for k, v in self.given.items() if KEYS.get(k) not in over.changes}
-        replaced = {KEYS[name] for name in over.given if name in KEYS}
-        changes = {k: v for k, v in self.changes.items() if k not in replaced}
-        return Settings({**kept, **over.given}, {**changes, **over.changes}, self.file or over.file)
 
 
-@dataclass(frozen=True, slots=True)
-class Cars:
-    """The cars of a comparison; car -> what was changed in it; what was left out where it has no meaning."""
+class Keywords(TypedDict, total=False):
+    """The settings that functions take as keywords beside the strategies; a test holds them to `Settings`."""
 
-    cars: list[Architecture]
-    changes: dict[str, dict[str, Any]]
-    left_out: list[str]
-
-
-def read_study(path: Path) -> Settings:
-    """The settings of a study file, its paths taken from where it lies; DataError with every fault."""
-    contents = read_contents(path)
-    for key, what in _OTHER_FILES.items():
-        if key in contents:
-            raise DataError(f"{path}: {key} is a key of {what}")
-    settings = settings_of(str(path), contents)
-    given = dict(settings.given)
-    if "cycle" in given:
-        given["cycle"] = beside_study(path, given["cycle"], ".csv")
-    if "architectures" in given:
-        given["architectures"] = [beside_study(path, a, ".toml") for a in given["architectures"]]
-    return Settings(given, _beside(path, settings.changes), path)
+    nox_weight: float
+    allow_shortfall: bool
+    free_gear: bool
+    refine: bool
+    horizon_s: float | None
+    soc_start: float | None
+    soc_min: float | None
+    soc_max: float | None
+    soc_end: float | str | None
+    auxiliaries_w: float | None
+    mass_kg: float | None
+    start_cost_g: float | None
+    shift_cost_g: float | None
+    changes: Mapping[str, Any] | None
 
 
-def changes_in(path: Path, contents: Mapping[str, Any]) -> dict[str, Any]:
-    """Key path -> value of a study file's [set], its paths taken from where it lies."""
-    table = contents.get("set")
-    return _beside(path, _flat(table)) if isinstance(table, Mapping) else {}
+def _file_fields() -> dict[str, Any]:
+    """Key of a study file -> its type and default: those of the settings, changes as the table [set]."""
+    hints = get_type_hints(Settings, include_extras=True)
+    own = {f.name: (hints[f.name], f.default) for f in fields(Settings) if f.name != "changes"}
+    return own | {"set": (dict[str, Any], Field(default_factory=dict))}
 
 
-def _beside(path: Path, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Changes with the files of components taken from where the study lies."""
-    changes = dict(changes)
-    for key in COMPONENTS:
-        if isinstance(value := changes.get(key), str):
-            changes[key] = beside_study(path, value, ".toml")
-    return changes
+CompareFile = create_model(
+    "CompareFile",
+    __base__=FileModel,
+    __doc__="A study file of compare: cycle, architectures, and a key for every setting.",
+    cycle=(str, "nedc"),
+    architectures=(Names | None, None),
+    **_file_fields(),
+)
 
 
-def settings_of(place: str, contents: Mapping[str, Any]) -> Settings:
-    """Settings from keys and values, checked; `place` is how a message names where they stand."""
+def given_of(place: str, contents: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys and values of a study as they are given, checked, its `set` as key path -> value.
+
+    `place` is how a message names where they stand. DataError with every fault.
+    """
     checked(place, dict(contents), CompareFile)
-    changes = _flat(contents.get("set", {}))
-    given = {name: value for name, value in contents.items() if name != "set"}
+    changes = flat_changes(contents.get("set", {}))
     for name, key in KEYS.items():
-        if name in given and key in changes:
+        if name in contents and key in changes:
             raise DataError(f"{place}: {name} and set {key} are one; leave one of them out")
-    return Settings(given, changes)
+    return {**contents, "set": changes}
 
 
-def assignments(texts: Sequence[str]) -> dict[str, Any]:
-    """Key path -> value of texts such as `machine.power_max_w=2e4`.
+def joined(below: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """What two places give, both as `given_of` has it, the second on top."""
+    kept = {name: value for name, value in below.items() if KEYS.get(name) not in over["set"]}
+    replaced = {KEYS[name] for name in over if name in KEYS}
+    changes = {key: value for key, value in below["set"].items() if key not in replaced}
+    return {**kept, **over, "set": {**changes, **over["set"]}}
 
-    The value is written as in TOML, but a name or a path needs no quotes, which a shell takes away.
+
+class Study(NamedTuple):
+    """A comparison: cycle and architectures by name or path, None for the shipped ones, and how they are solved."""
+
+    cycle: str
+    architectures: tuple[str, ...] | None
+    settings: Settings
+
+
+def study_of(given: Mapping[str, Any]) -> Study:
+    """The comparison of what is given, as `given_of` has it, and the default of what is not."""
+    file = CompareFile.model_validate(dict(given))
+    own = {f.name: getattr(file, f.name) for f in fields(Settings) if f.name != "changes"}
+    return Study(file.cycle, file.architectures, Settings(**own, changes=file.set))
+
+
+def settings_from(place: str, keywords: Mapping[str, Any], **own: Any) -> Settings:
+    """Settings of a function's keywords, and of what that function knows itself; None is what is not given.
+
+    place: names the function. DataError for a keyword that is no setting, with those that are, and a wrong value.
     """
-    changes: dict[str, Any] = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        key = key.strip()
-        if not equals or not key:
-            raise DataError(f"--set {shown(text)}; needed: KEY=VALUE, as machine.power_max_w=2e4")
-        if key in changes:
-            raise DataError(f"--set {printable(key)} is given twice; leave one out")
-        changes[key] = _toml_value(key, value.strip())
-    return changes
-
-
-def _toml_value(key: str, text: str) -> Any:
-    try:
-        found = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        found = {"value": text} if _NAME_OR_PATH.fullmatch(text) else {}
-    if list(found) != ["value"]:
+    known = list(Keywords.__annotations__)
+    for name in keywords:
+        if name not in known:
+            raise DataError(f"{place}: {unknown_name('setting', printable(name), known)}")
+    given = {
+        name: _plain(value) for name, value in {**keywords, **own}.items() if value is not None
+    }
+    changes = given.pop("changes", {})
+    if not isinstance(changes, Mapping):
         raise DataError(
-            f"--set {printable(key)}={shown(text)[1:-1]}: not a value; allowed: a number, true, false, a list "
-            f"[1, 2], a table {{ a = 1 }}, a name or path, or text in quotes, as --set '{printable(key)}=\"text\"'"
+            f"{place}: changes = {shown(changes)}; needed: a mapping of key path to value"
         )
-    return found["value"]
+    return study_of(given_of(place, {**given, "set": dict(changes)})).settings
 
 
-def cars_of(settings: Settings, wanted: Sequence[str] | None = None) -> Cars:
-    """The architectures, by default those of the settings or else the shipped ones, with the settings made in them.
-
-    Raises DataError where a setting has a meaning for none of them.
-    """
-    names = settings.get("architectures", None) if wanted is None else wanted
-    names = shipped_names("architectures", ".toml") if names is None else names
-    cars, changes, without = [], {}, {}
-    for name in names:
-        car = load_architecture(name, settings.changes)
-        car = car.with_free_gear() if settings.get("free_gear", False) else car
-        named, left = _named_changes(settings, car)
-        if named:
-            car = load_architecture(name, {**settings.changes, **named})
-            car = car.with_free_gear() if settings.get("free_gear", False) else car
-        cars.append(car)
-        changes[car.name] = {**settings.changes, **named}
-        for setting in left:
-            without.setdefault(setting, []).append(car.name)
-    for setting, unfit in without.items():
-        if len(unfit) == len(cars):
-            raise DataError(f"{setting} = {settings.given[setting]}: {_why(setting, unfit)}")
-    return Cars(cars, changes, [f"{setting}: {_why(setting, u)}" for setting, u in without.items()])
+def _plain(value: Any) -> Any:
+    """A number of NumPy as Python's own; everything else as it is."""
+    return value.item() if isinstance(value, Real | np.bool_) and hasattr(value, "item") else value
 
 
-def _named_changes(settings: Settings, car: Architecture) -> tuple[dict[str, Any], list[str]]:
-    """Key path -> value of the settings that have a meaning for a car, and the names of those without."""
-    drives = bool(car.functions - {"start_stop"})
-    named, left = {}, []
-    for name in KEYS:
-        if name not in settings.given:
-            continue
-        fits = {"soc": drives, "shift": car.gear == "free"}.get(name.partition("_")[0], True)
-        if not drives and name == "soc_end" and settings.given[name] == NEUTRAL:
-            continue  # what such a battery is anyway
-        if fits:
-            named[KEYS[name]] = settings.given[name]
-        else:
-            left.append(name)
-    if named.get(KEYS["soc_end"]) == NEUTRAL:
-        named[KEYS["soc_end"]] = named.get(KEYS["soc_start"], car.soc_start)
-    return named, left
-
-
-def _why(setting: str, cars: Sequence[str]) -> str:
-    listed = printable(", ".join(cars))
-    if setting == "shift_cost_g":
-        return f'not for {listed}, whose gear is the cycle\'s; free it with --free-gear or gear = "free"'
-    return (
-        f"not for {listed}, whose battery carries the electric load only; set {KEYS[setting]} changes it "
-        "all the same"
-    )
-
-
-def _flat(table: Mapping[str, Any], at: str = "") -> dict[str, Any]:
+def flat_changes(table: Mapping[str, Any], at: str = "") -> dict[str, Any]:
     """Key path -> value of nested tables; of a component given as a table, its file and what replaces its keys."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
@@ -259,17 +195,9 @@ def _flat(table: Mapping[str, Any], at: str = "") -> dict[str, Any]:
         if isinstance(value, dict) and value:
             inner = dict(value)
             file = {path: inner.pop("file")} if path in COMPONENTS and "file" in inner else {}
-            leaves = file | _flat(inner, path)
+            leaves = file | flat_changes(inner, path)
         for found, leaf in leaves.items():
             if found in flat:
                 raise DataError(f"set {printable(found)} is given twice; leave one out")
             flat[found] = leaf
     return flat
-
-
-def beside_study(path: Path, name: str, suffix: str) -> str:
-    """A name as it stands; a path in a study file, from where that lies and still a path."""
-    if not is_path(name, suffix):
-        return name
-    located = str(path.parent / name)
-    return located if is_path(located, suffix) else f"./{located}"

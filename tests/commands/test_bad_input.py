@@ -456,6 +456,6 @@ def test_interrupt(hevopt, monkeypatch, cause):
             raise KeyboardInterrupt
         raise SystemError("returned a result with an exception set") from cause
 
-    monkeypatch.setattr("hevopt.studies.comparison.compare", interrupted)
+    monkeypatch.setattr("hevopt.studies.comparison.compare_cars", interrupted)
     seen = hevopt("compare")
     assert seen == (130, "", "hevopt: interrupted; nothing was written\n")

@@ -5,6 +5,9 @@ import pytest
 from hevopt import load_architecture, load_cycle, simulate
 from hevopt.strategies import STRATEGIES, fitting
 from hevopt.studies.case import prepare
+from hevopt.studies.settings import Settings
+
+REFINED = Settings(refine=True)
 
 
 def cost_and_bound(case):
@@ -17,7 +20,7 @@ def cost_and_bound(case):
 def test_few_levels_refined_come_to_what_many_levels_give(name):
     car, cycle = load_architecture(name), load_cycle("nedc")
     coarse, _ = cost_and_bound(prepare(car, cycle, levels=6))
-    refined, bound = cost_and_bound(prepare(car, cycle, levels=6, refine=True))
+    refined, bound = cost_and_bound(prepare(car, cycle, REFINED, levels=6))
     many, _ = cost_and_bound(prepare(car, cycle, levels=161))
     assert coarse > many * 1.0005
     assert refined == pytest.approx(many, rel=4e-4)
@@ -27,13 +30,15 @@ def test_few_levels_refined_come_to_what_many_levels_give(name):
 @pytest.mark.parametrize("name", ["B", "C1", "D"])
 def test_the_default_levels_need_no_refinement(name):
     car, cycle = load_architecture(name), load_cycle("nedc")
-    costs = [cost_and_bound(prepare(car, cycle, refine=refine))[0] for refine in (False, True)]
+    costs = [
+        cost_and_bound(prepare(car, cycle, Settings(refine=refine)))[0] for refine in (False, True)
+    ]
     assert costs[1] == pytest.approx(costs[0], rel=2e-4)
 
 
 def test_the_certificate_is_of_the_table_with_the_added_levels():
     car = load_architecture("C2")
-    case = prepare(car, load_cycle("hwfet"), levels=6, refine=True)
+    case = prepare(car, load_cycle("hwfet"), REFINED, levels=6)
     assert any(control.level.startswith("refined") for control in case.problem.table.controls)
     for name in fitting(car.functions):
         trajectory = simulate(case.problem, STRATEGIES[name].solve(case.problem).control)

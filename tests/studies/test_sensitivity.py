@@ -11,8 +11,8 @@ from command_line import call
 from hevopt import InfeasibleError, SolverError, load_architecture, load_cycle
 from hevopt.pages.comparison.saved import load_results
 from hevopt.studies.case import prepare
-from hevopt.studies.comparison import run_case
-from hevopt.studies.sensitivity import sensitivities, unsolved
+from hevopt.studies.sensitivity import effects_on, sensitivities, unsolved
+from hevopt.studies.solved import run_case
 
 
 @cache
@@ -66,13 +66,13 @@ def test_a_car_has_the_parameters_of_its_own_files():
 
 def test_what_is_changed_from_the_start_is_the_car_that_is_compared_with():
     base = {"car.mass_kg": 1500, "engine": "engine_diesel_1600_steep_nox"}
-    effects = {e.parameter: e for e in sensitivities("A", "nedc", base=base)}
+    effects = {e.parameter: e for e in sensitivities("A", "nedc", changes=base)}
     assert effects["vehicle mass"].values == pytest.approx([1350, 1500, 1650])
     assert "NOx map, high over low load" not in effects  # it has the other one already
 
 
 def test_a_value_that_cannot_be_driven_has_no_figures_but_a_reason_and_the_others_keep_theirs():
-    effects = {e.parameter: e for e in sensitivities("A", "nedc", base={"car.mass_kg": 3400})}
+    effects = {e.parameter: e for e in sensitivities("A", "nedc", changes={"car.mass_kg": 3400})}
     mass = effects.pop("vehicle mass")
     assert mass.values[-1] == pytest.approx(3740)
     for figures in (mass.fuel_l_per_100km, mass.delta_percent, mass.nox_mg_per_km):
@@ -85,7 +85,7 @@ def test_a_value_that_cannot_be_driven_has_no_figures_but_a_reason_and_the_other
 
 def test_a_car_that_cannot_be_solved_as_given_is_named():
     with pytest.raises(InfeasibleError, match=r"^A, as given: "):
-        sensitivities("A", "nedc", base={"car.mass_kg": 9000})
+        sensitivities("A", "nedc", changes={"car.mass_kg": 9000})
 
 
 def test_where_nothing_is_burnt_there_is_no_change(hevopt):
@@ -125,15 +125,15 @@ def test_studies_of_a_refined_comparison_are_refined(hevopt):
 
 
 def test_what_a_car_lacks_costs_the_comparison_nothing(hevopt, monkeypatch):
-    def failing(car, *_, **__):
-        if Path(car).stem == "B":
+    def failing(car, *others):
+        if car.name == "B":
             raise InfeasibleError("B fails")
-        return sensitivities(car)
+        return effects_on(car, *others)
 
     def no_front(*_, **__):
         raise SolverError("no front")
 
-    monkeypatch.setattr("hevopt.studies.sensitivity.sensitivities", failing)
+    monkeypatch.setattr("hevopt.studies.sensitivity.effects_on", failing)
     monkeypatch.setattr("hevopt.studies.pareto.front", no_front)
     words = ("--sensitivity", "--fronts", "--save", "saved.gz", "--out", "rows.csv")
     status, out, err = hevopt("compare", "--architectures", "A,B", "--strategies", "dp", *words)

@@ -2,25 +2,30 @@
 
 import hashlib
 import json
+import re
 from pathlib import Path
+from typing import get_args, get_type_hints
 
+import numpy as np
 import pytest
 from command_line import call
 
-from hevopt import DataError, load_architecture, load_cycle
+from hevopt import DataError, compare, load_architecture, load_cycle, solve
 from hevopt.commands.options import SETTINGS
 from hevopt.files.lookup import shipped_folder
-from hevopt.studies import comparison as study
+from hevopt.studies import solved
+from hevopt.studies.cars import cars_of
 from hevopt.studies.case import prepare
 from hevopt.studies.settings import (
     KEYS,
     CompareFile,
+    Keywords,
     Settings,
-    assignments,
-    cars_of,
-    read_study,
-    settings_of,
+    given_of,
+    joined,
+    study_of,
 )
+from hevopt.studies.study_file import assignments, read_study
 
 STRATEGIES = ("conventional", "nox_cut", "ecms", "dp", "convex", "mpc", "a_ecms", "sdp")
 SHORT = "time_s,speed_kmh\n0,0\n5,0\n15,40\n40,40\n50,0\n60,0\n70,50\n110,50\n125,0\n130,0\n"
@@ -45,10 +50,34 @@ def figures(result):
     return [{k: v for k, v in row.items() if k != "solve_s"} for row in result["rows"]]
 
 
-def test_every_setting_is_an_option_and_a_key_of_the_study_file():
-    assert set(SETTINGS) | {"cycle", "architectures", "strategies", "refine", "horizon_s"} == set(
-        CompareFile.model_fields
-    )
+def spelt(option):
+    """The type of an option, as a setting would have it."""
+    kind = get_args(get_args(option)[0])[0]
+    return {list[str]: "many", str: "text", float: "number", bool: "flag"}[kind]
+
+
+def of_setting(kind):
+    """The same of a setting's annotation."""
+    text = str(kind)
+    if "Mapping" in text or "tuple" in text:
+        return "many" if "Mapping" in text else "text"
+    return "text" if "Literal" in text else "flag" if "bool" in text else "number"
+
+
+def test_the_settings_are_one_list_for_study_file_options_and_keywords():
+    hints = get_type_hints(Settings)
+    keys = {"cycle", "architectures", "set", *hints} - {"changes"}
+    assert keys == set(CompareFile.model_fields)
+    assert {name: spelt(option) for name, option in SETTINGS.items()} == {
+        name: of_setting(kind) for name, kind in hints.items()
+    }
+    assert set(Keywords.__annotations__) == set(hints) - {"strategies"}
+    assert study_of({"set": {}}) == ("nedc", None, Settings())
+
+
+def test_every_setting_is_told_of_where_a_user_of_python_looks():
+    for name in get_type_hints(Settings):
+        assert re.search(rf"\b{name}\b", Settings.__doc__), name
 
 
 @pytest.mark.parametrize(
@@ -139,12 +168,12 @@ def test_an_asked_end_charge_is_reached_and_neutral_takes_it_back(hevopt, tmp_pa
 
 @pytest.mark.parametrize("soc_end", [0.5, 0.7])
 def test_every_strategy_knows_the_asked_end_charge(monkeypatch, soc_end):
-    monkeypatch.setattr(study, "shipped_cycles", lambda: [load_cycle("udds")])
+    monkeypatch.setattr(solved, "shipped_cycles", lambda: [load_cycle("udds")])
     car = load_architecture("C2", {"battery.soc.end": soc_end})
     case = prepare(car, load_cycle("hwfet"))
     missed = []
     for name in STRATEGIES:
-        row, _, trajectory = study.run_case(case, name)
+        row, _, trajectory = solved.run_case(case, name)
         off_j = trajectory.end_j - case.problem.end_min_j
         share = abs(off_j) / (trajectory.total_fuel_kg * 42.9e6)
         word = "end charge above" if off_j > 0 else "end charge missed"
@@ -164,27 +193,25 @@ def test_charge_settings_are_for_batteries_that_drive(hevopt):
     assert "soc_end: not for A, whose battery carries the electric load only" in out
     status, _, err = hevopt("compare", "--architectures", "A,B", "--soc-end", "0.58")
     assert status == 2 and "soc_end = 0.58: not for A, B" in err
-    assert cars_of(Settings({"soc_end": "neutral"}), ["A", "B"]).left_out == []
-    forced = cars_of(Settings({}, {"battery.soc.end": 0.5}), ["A"]).cars[0]
+    assert cars_of(["A", "B"], Settings(soc_end="neutral")).left_out == []
+    forced = cars_of(["A"], Settings(changes={"battery.soc.end": 0.5})).cars[0]
     assert forced.soc_end == 0.5
 
 
 def test_the_cost_of_a_shift_needs_a_free_gear(hevopt):
     status, _, err = hevopt("run", "C2", "--shift-cost", "0.3")
     assert status == 2 and "not for C2, whose gear is the cycle's" in err
-    car = cars_of(Settings({"shift_cost_g": 0.3, "free_gear": True}), ["C2"]).cars[0]
+    car = cars_of(["C2"], Settings(shift_cost_g=0.3, free_gear=True)).cars[0]
     assert car.gear == "free" and car.gearbox.shift_fuel_kg == pytest.approx(3e-4)
 
 
 def test_options_go_before_the_file_by_whichever_name():
-    file = settings_of("f", {"mass_kg": 1400, "set": {"machine": {"power_max_w": 2e4}}})
-    over = settings_of("o", {"set": {"car.mass_kg": 1500, "machine.power_max_w": 1e4}})
-    both = file.joined(over)
-    assert both.given == {} and both.changes == {"car.mass_kg": 1500, "machine.power_max_w": 1e4}
-    named = settings_of("f", {"set": {"car.mass_kg": 1500}}).joined(
-        settings_of("o", {"mass_kg": 99})
-    )
-    assert (named.given, named.changes) == ({"mass_kg": 99}, {})
+    file = given_of("f", {"mass_kg": 1400, "set": {"machine": {"power_max_w": 2e4}}})
+    over = given_of("o", {"set": {"car.mass_kg": 1500, "machine.power_max_w": 1e4}})
+    both = joined(file, over)
+    assert both == {"set": {"car.mass_kg": 1500, "machine.power_max_w": 1e4}}
+    named = joined(given_of("f", {"set": {"car.mass_kg": 1500}}), given_of("o", {"mass_kg": 99}))
+    assert named == {"mass_kg": 99, "set": {}}
 
 
 def test_flags_of_the_file_can_be_taken_back(hevopt):
@@ -206,11 +233,11 @@ def test_paths_in_a_study_are_relative_to_it(hevopt, tmp_path):
         'cycle = "own.csv"\narchitectures = ["./car.toml"]\n'
         '[set]\nengine = { file = "./engine.toml", start_fuel_g = 0.4 }\n'
     )
-    settings = read_study(Path("deep/study.toml"))
-    car = cars_of(settings).cars[0]
+    study = study_of(read_study(Path("deep/study.toml")))
+    car = cars_of(study.architectures, study.settings).cars[0]
     assert car.engine.start_fuel_kg == pytest.approx(4e-4)
     assert car.engine.idle_radps == pytest.approx(900 / 60 * 6.283185307)
-    assert settings.get("cycle", None) == "deep/own.csv"
+    assert study.cycle == "deep/own.csv"
 
 
 def test_json_names_inputs_versions_and_settings(hevopt):
@@ -228,8 +255,6 @@ def test_json_names_inputs_versions_and_settings(hevopt):
 
 
 def test_run_and_table_take_the_same_settings(hevopt):
-    import numpy as np
-
     words = (
         "--cycle",
         "short.csv",
@@ -372,12 +397,74 @@ def test_notes_say_what_an_asked_end_charge_means_and_when_there_is_no_reference
     assert status == 3 and "vs ref: against nothing, every row failed." in out
 
 
-def test_a_wrong_setting_from_python_is_a_data_error():
-    with pytest.raises(DataError, match="allowed: 50 to 100000"):
-        settings_of("here", {"mass_kg": 1})
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"mass_kg": 1}, "compare: mass_kg = 1; allowed: 50 to 100000"),
+        ({"nox_wieght": 3}, "compare: setting 'nox_wieght' not found; close matches: nox_weight; available: nox"),
+        ({"nox_weight": "3"}, "nox_weight = '3': a number is needed"),
+        ({"nox_weight": float("nan")}, "a finite number is needed"),
+        ({"refine": 1}, "refine = 1: true or false is needed"),
+        ({"soc_end": "high"}, "soc_end = 'high': allowed: \"neutral\""),
+        ({"changes": ["mass_kg"]}, "needed: a mapping of key path to value"),
+        ({"changes": {"car.mass_kg": 1400}, "mass_kg": 1400}, "are one; leave one of them out"),
+        ({"changes": {"machin.power_max_w": 1}}, "unknown key machin; close matches: machine"),
+        ({"strategies": ["dp", "dp"]}, "'dp' is given twice"),
+        ({"strategies": []}, "name at least one"),
+        ({"strategies": "pd"}, "strategy 'pd' not found; close matches: dp"),
+        ({"strategies": 3}, "a list [...] is needed"),
+        ({"horizon_s": 10, "strategies": "dp"}, "no strategy asked for looks ahead"),
+        ({"architectures": []}, "no architecture given"),
+        ({"architectures": ["C2", "C2"]}, "is given twice"),
+        ({"architectures": "A", "soc_end": 0.5}, "soc_end = 0.5: not for A"),
+        ({"cycle": "nedk"}, "close matches: nedc"),
+    ],
+)  # fmt: skip
+def test_a_wrong_setting_from_python_is_one_data_error(settings, said):
+    with pytest.raises(DataError) as error:
+        compare(**({"architectures": "C2"} | settings))
+    assert said in str(error.value)
+
+
+def test_settings_change_no_car_that_is_read_already():
+    car = load_architecture("C2")
+    with pytest.raises(DataError, match="mass_kg, changes would change its file"):
+        compare("hwfet", car, mass_kg=1400, changes={"hybrid_mass_kg": 0})
+
+
+def test_keywords_change_what_options_change(hevopt):
+    words = ("--architectures", "C2", "--strategies", "dp", "--mass", "1450", "--soc-end", "0.58")
+    by_option = result(hevopt, *words, "--set", "hybrid_mass_kg=0")
+    by_keyword = compare(
+        "short.csv", "C2", "dp", mass_kg=np.int64(1450), soc_end=np.float64(0.58),
+        changes={"hybrid_mass_kg": 0}, horizon_s=None,
+    )  # fmt: skip
+    assert figures(by_option) == figures({"rows": [row.as_dict() for row in by_keyword.rows]})
+
+
+def test_what_has_no_meaning_for_a_car_is_left_out_and_said():
+    left = compare("hwfet", ["A", "C2"], ["baseline"], soc_end=0.58).left_out
+    assert len(left) == 1
+    assert left[0].startswith("soc_end: not for A, whose battery carries the electric load only;")
+
+
+@pytest.mark.parametrize(
+    ("strategy", "settings", "said"),
+    [
+        ("dp", {"node": 100}, "solve, dp: setting 'node' not found; close matches: nodes; available: "),
+        ("dp", {"nodes": "many"}, "solve, dp: nodes = 'many'; needed: a number"),
+        ("ecms", {"nodes": 100}, "solve, ecms: setting 'nodes'; this strategy takes none"),
+        ("sdp", {}, "solve, sdp needs training"),
+        ("mcp", {}, "strategy 'mcp' not found; close matches: mpc"),
+    ],
+)  # fmt: skip
+def test_a_wrong_setting_of_a_strategy_is_one_data_error(problem_of, strategy, settings, said):
+    with pytest.raises(DataError) as error:
+        solve(problem_of("C2", "nedc"), strategy, **settings)
+    assert said in str(error.value)
 
 
 def test_a_path_without_suffix_stays_a_path_beside_a_study_in_the_working_folder(hevopt):
     Path("nedc").write_text("time_s,speed_kmh\n0,0\n10,36\n20,0\n")
     Path("study.toml").write_text('cycle = "./nedc"\narchitectures = ["A"]\nsoc_end = "neutral"\n')
-    assert read_study(Path("study.toml")).given["cycle"] == "./nedc"
+    assert read_study(Path("study.toml"))["cycle"] == "./nedc"

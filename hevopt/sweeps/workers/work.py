@@ -19,8 +19,8 @@ from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
 from hevopt.studies.case import Case as SolvedCase
 from hevopt.studies.case import dp_case, require_nox
-from hevopt.studies.comparison import run_case
 from hevopt.studies.rows import Row, shortfall_steps
+from hevopt.studies.solved import run_case
 from hevopt.studies.status import Status
 from hevopt.sweeps.plan.jobs import BOUND, FIGURES, Case, Job, Outcome, inputs_digest
 from hevopt.units import litres_per_100km

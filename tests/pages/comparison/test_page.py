@@ -62,7 +62,7 @@ def test_a_page_of_what_failed_is_still_written(monkeypatch, capsys, tmp_path):
 
 def test_a_cycle_too_long_for_a_page_is_refused_before_solving(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(
-        "hevopt.studies.comparison.compare", lambda *a, **k: pytest.fail("solved first")
+        "hevopt.studies.comparison.compare_cars", lambda *a, **k: pytest.fail("solved first")
     )
     cycle = tmp_path / "long.csv"
     lines = [f"{k / 10},{5 * (0 < k < 20_501)}" for k in range(20_502)]
@@ -77,7 +77,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_solving(
     monkeypatch, capsys, tmp_path, option
 ):
     monkeypatch.setattr(
-        "hevopt.studies.comparison.compare", lambda *a, **k: pytest.fail("solved first")
+        "hevopt.studies.comparison.compare_cars", lambda *a, **k: pytest.fail("solved first")
     )
     status, _, err = call(monkeypatch, capsys, *SMALL, option, str(tmp_path / "no" / "p.html"))
     assert status == 2 and "No such folder" in err
@@ -91,7 +91,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_solving(
 @pytest.mark.parametrize("option", ["--report", "--save"])
 def test_a_component_or_a_study_file_is_not_overwritten(monkeypatch, capsys, tmp_path, option):
     monkeypatch.setattr(
-        "hevopt.studies.comparison.compare", lambda *a, **k: pytest.fail("solved first")
+        "hevopt.studies.comparison.compare_cars", lambda *a, **k: pytest.fail("solved first")
     )
     car, study = tmp_path / "car.toml", tmp_path / "study.toml"
     car.write_bytes((shipped_folder("architectures") / "components/car_compact.toml").read_bytes())

@@ -6,8 +6,9 @@ from hevopt import load_architecture, load_cycle
 from hevopt.errors import SolverError, UnknownNoxError
 from hevopt.files.lookup import shipped_folder
 from hevopt.studies.case import prepare
-from hevopt.studies.comparison import run_case
 from hevopt.studies.rows import Row
+from hevopt.studies.settings import Settings
+from hevopt.studies.solved import run_case
 from hevopt.sweeps.plan.jobs import FIGURES, Case, Job, jobs_of
 from hevopt.sweeps.workers.work import run_job
 
@@ -23,7 +24,7 @@ def one_job(strategies=("ecms", "dp", "bound"), weights=(0.0, 10.0), **settings)
 def test_a_job_gives_the_rows_that_a_comparison_would():
     outcomes = list(run_job(one_job()[0]))
     assert [o.status for o in outcomes] == ["ok"] * 6
-    case = prepare(load_architecture("C2", CHANGES), load_cycle("nedc"), nox_weight=10.0)
+    case = prepare(load_architecture("C2", CHANGES), load_cycle("nedc"), Settings(nox_weight=10.0))
     row, _, trajectory = run_case(case, "ecms")
     stored = next(o.row for o in outcomes[3:] if o.row["strategy"] == "ecms")
     assert {k: v for k, v in stored.items() if k in row.as_dict()} == {

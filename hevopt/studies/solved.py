@@ -1,0 +1,97 @@
+"""One strategy on one case: which strategies fit, what each is told, and the row of what it does."""
+
+from collections.abc import Iterable, Sequence
+from math import isfinite
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.driving.cycle import Cycle, shipped_cycles
+from hevopt.errors import DataError, SolverError
+from hevopt.powertrain.powertrain import build_problem
+from hevopt.problem.problem import Plan, Trajectory
+from hevopt.problem.simulation import simulate
+from hevopt.strategies import STRATEGIES, fitting, strategy_named
+from hevopt.studies.case import Case, require_nox
+from hevopt.studies.rows import Row, row_of
+
+# In place of names: every strategy that fits the car.
+EVERY = "all"
+
+
+def run_case(
+    case: Case, strategy: str, horizon_s: float | None = None
+) -> tuple[Row, Plan, Trajectory]:
+    """One strategy on a case: its row (no reference yet), plan and trajectory.
+
+    Raises UnknownNoxError for a strategy that cuts NOx where the engine has no data on it.
+    """
+    if _cuts_nox(strategy):
+        require_nox(case.car, f"strategy {strategy}")
+    plan, trajectory, solve_s = case.dp_plan, case.dp_trajectory, case.dp_s
+    if strategy != "dp":
+        settings = _told(case, strategy, horizon_s)
+        began = perf_counter()
+        plan = strategy_named(strategy).solve(case.problem, **settings)
+        solve_s = perf_counter() - began
+        trajectory = simulate(case.problem, plan.control)
+    row = row_of(case, strategy, trajectory, solve_s)
+    for name, value in row.as_dict().items():
+        if isinstance(value, float) and not isfinite(value):
+            raise SolverError(
+                f"{case.car.name} {strategy}: {name} is {value}; the figures of {case.car.source} are "
+                "too far from those of a car"
+            )
+    return row, plan, trajectory
+
+
+def _told(case: Case, strategy: str, horizon_s: float | None) -> dict[str, Any]:
+    """What a strategy is told beyond the problem: its preview, the shipped cycles but this one to learn from."""
+    chosen = strategy_named(strategy)
+    settings: dict[str, Any] = {}
+    if chosen.previews and horizon_s is not None:
+        settings["horizon_s"] = horizon_s
+    if chosen.learns:
+        weight = case.problem.nox_weight
+        settings["training"] = [
+            build_problem(case.car, other, nox_weight=weight, allow_shortfall=True)
+            for other in shipped_cycles()
+            if not _same_drive(other, case.cycle)
+        ]
+    return settings
+
+
+def _same_drive(one: Cycle, other: Cycle) -> bool:
+    """Whether two cycles are one drive, under whatever names."""
+    return np.array_equal(one.time_s, other.time_s) and np.array_equal(
+        one.speed_mps, other.speed_mps
+    )
+
+
+def check_horizon(horizon_s: float | None, strategies: Iterable[str]) -> None:
+    """DataError for a preview that none of the strategies takes."""
+    if horizon_s is None or any(strategy_named(name).previews for name in strategies):
+        return
+    able = ", ".join(name for name, strategy in STRATEGIES.items() if strategy.previews)
+    raise DataError(
+        f"horizon_s {horizon_s:g}: no strategy asked for looks ahead; add one that does ({able}), or leave it out"
+    )
+
+
+def strategies_for(car: Architecture, wanted: Sequence[str] | None) -> list[str]:
+    """The strategies to run on a car: those named, every one that fits it, or the usual ones that do.
+
+    Without NOx data, only what is named cuts NOx. DataError for a name that is none.
+    """
+    if wanted is not None and list(wanted) != [EVERY]:
+        for name in wanted:
+            strategy_named(name)
+        return list(wanted)
+    names = fitting(car.functions, every=wanted is not None)
+    return [name for name in names if car.engine.nox_known or not _cuts_nox(name)]
+
+
+def _cuts_nox(strategy: str) -> bool:
+    return "nox_cut" in strategy_named(strategy).needs
