@@ -136,11 +136,9 @@ def figures() -> str:
         ]
         choices, low_high = choices_of(problem), np.array(problem.window_j)
         terminal = np.tile(np.linspace(1e-3, 0.0, 31), (choices.modes, 1))
-        value = _rollout_kernels.backward(
-            choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-            choices.switch_allowed, terminal, np.full(choices.steps + 1, low_high[0]),
-            np.ptp(low_high) / 30, 1e-4, 0.0, 1.0, problem.battery.arrays,
-        )  # fmt: skip
+        grid = _rollout_kernels.Grid(np.full(choices.steps + 1, low_high[0]), np.ptp(low_high) / 30)
+        penalty = _rollout_kernels.Penalty(1e-4, 0.0, 1.0)
+        value = _rollout_kernels.backward(choices, terminal, grid, penalty, problem.battery.arrays)
         found += [rollout.cost_kg, rollout.end_j, *bounds, *value[0].flat]
     return " ".join(float(figure).hex() for figure in found)
 

@@ -1,17 +1,51 @@
 """Compiled parts of the lower-bound dynamic program; the proof is in lower_dp.py."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.problem._battery_kernels import chemical_power, drain_and_slope
+from hevopt.bounds._step_prices_kernels import WindowCells
+from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, drain_and_slope
+from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.choices import Choices
+
+
+class PartedGrid(NamedTuple):
+    """An even grid of stored energy, the nodes that part it into pieces and their energies, (piece + 1,)."""
+
+    low_j: float
+    cell_j: float
+    breaks: Indices
+    breaks_j: Array
+
+
+class Moves(NamedTuple):
+    """Upper bounds of the choices' moves, in cells: offset + rise x node, (entry, piece) each."""
+
+    breaks: Indices
+    offset: Array
+    rise: Array
+
+
+class Relaxation(NamedTuple):
+    """What takes the place of infinity: per cell below the grid, and where no path is known."""
+
+    floor_kg: float
+    unreachable_kg: float
 
 
 @compiled()
-def moves_by_tangents(first, power, step_s, steep, grid_low, cell, breaks, low, high, battery):
+def moves_by_tangents(
+    choices: Choices, steep: Flags, grid: PartedGrid, battery: BatteryArrays
+) -> tuple[Array, Array]:
     """(entry, piece) offset and rise of tangents above the move, in cells over nodes; move concave in energy.
 
-    Tangents touch within the window [low, high]. steep: (entry,) where the move counts as it is at `high`.
+    Tangents touch within the battery's curves. steep: (entry,) where the move counts as it is at their end.
     """
+    first, power, step_s = choices.first, choices.power_w, choices.step_s
+    grid_low, cell, breaks, _ = grid
+    low, high = battery.energy_j[0], battery.energy_j[-1]
     pieces = len(breaks) - 1
     offset = np.empty((len(power), pieces))
     rise = np.empty((len(power), pieces))
@@ -28,10 +62,11 @@ def moves_by_tangents(first, power, step_s, steep, grid_low, cell, breaks, low, 
 
 
 @compiled()
-def moves_by_cells(
-    first, power, step_s, cell, piece_j, edges, voltage, discharge, charging, efficiency
-):
+def moves_by_cells(choices: Choices, grid: PartedGrid, cells: WindowCells) -> Array:
     """(entry, piece) greatest move in cells within each piece, from the best of every window cell it touches."""
+    first, power, step_s = choices.first, choices.power_w, choices.step_s
+    edges, voltage, discharge, charging, efficiency = cells
+    cell, piece_j = grid.cell_j, grid.breaks_j
     pieces = len(piece_j) - 1
     offset = np.full((len(power), pieces), -np.inf)
     for k in range(len(step_s)):
@@ -51,14 +86,16 @@ def moves_by_cells(
 
 
 @compiled()
-def _lower_nodes(best, ahead, cost, share, rise):
+def _lower_nodes(best: Array, ahead: Array, cost: float, share: float, rise: float) -> None:
     for j in range(len(best)):
         weight = share + rise * np.int32(j)
         best[j] = min(best[j], cost + ahead[j] + weight * (ahead[j + 1] - ahead[j]))
 
 
 @compiled()
-def _raise_defects(defect, best, ahead, cost, share, rise):
+def _raise_defects(
+    defect: Array, best: Array, ahead: Array, cost: float, share: float, rise: float
+) -> None:
     for j in range(len(defect)):
         weight = share + rise * np.int32(j)
         line = weight * best[j] + (1.0 - weight) * best[j + 1]
@@ -66,7 +103,7 @@ def _raise_defects(defect, best, ahead, cost, share, rise):
 
 
 @compiled()
-def _run_end(low, high, start, rise, whole):
+def _run_end(low: int, high: int, start: float, rise: float, whole: int) -> int:
     """First cell at or after `low` whose move start + rise (cell - low) has left `whole`, at most `high`."""
     if rise <= 0.0:
         return high
@@ -78,9 +115,12 @@ def _run_end(low, high, start, rise, whole):
 
 @compiled()
 def lower_backward(
-    first, cost, switch_kg, allowed, terminal, breaks, offset, rise, floor_kg, unreachable_kg
-):
+    choices: Choices, terminal: Array, moves: Moves, relaxation: Relaxation
+) -> Array:
     """(mode, node) lower bound of the cost-to-go before the first step; terminal: the same after the last."""
+    first, cost = choices.first, choices.cost_kg
+    breaks, offset, rise = moves
+    floor_kg, unreachable_kg = relaxation
     steps, modes, nodes = first.shape[0], first.shape[1] - 1, terminal.shape[1]
     pieces = len(breaks) - 1
     furthest = 0.0
@@ -142,7 +182,7 @@ def lower_backward(
         for m in range(modes):
             value[m] = unreachable_kg
             for n in range(modes):
-                if allowed[m, n]:
+                if choices.switch_allowed[m, n]:
                     for j in range(nodes):
-                        value[m, j] = min(value[m, j], switch_kg[m, n] + best[n, j])
+                        value[m, j] = min(value[m, j], choices.switch_kg[m, n] + best[n, j])
     return value

@@ -3,10 +3,12 @@
 import numpy as np
 
 from hevopt._compile import compiled
+from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.choices import Choices
 
 
 @compiled()
-def block_minima(first, value):
+def block_minima(first: Indices, value: Array) -> tuple[Array, Indices]:
     """(time, mode) least value of each block and its entry; inf and -1 where the block is empty."""
     steps, modes = first.shape[0], first.shape[1] - 1
     least = np.full((steps, modes), np.inf)
@@ -21,7 +23,7 @@ def block_minima(first, value):
 
 
 @compiled()
-def mode_path(least, switch_kg, allowed):
+def mode_path(least: Array, switch_kg: Array, allowed: Flags) -> tuple[Array, Indices]:
     """Cost-to-go (time + 1, mode) and best next mode (time, mode) of (time, mode) least values."""
     steps, modes = least.shape
     to_go = np.zeros((steps + 1, modes))
@@ -40,10 +42,10 @@ def mode_path(least, switch_kg, allowed):
 
 
 @compiled()
-def shortest_path(first, value, switch_kg, allowed, start_mode):
+def shortest_path(choices: Choices, value: Array, start_mode: int) -> tuple[float, Indices, Array]:
     """Least total of (entry,) values and switching, its (time,) entries, cost-to-go (time + 1, mode)."""
-    least, entry = block_minima(first, value)
-    to_go, follow = mode_path(least, switch_kg, allowed)
+    least, entry = block_minima(choices.first, value)
+    to_go, follow = mode_path(least, choices.switch_kg, choices.switch_allowed)
     path = np.zeros(len(least), dtype=np.int64)
     if np.isfinite(to_go[0, start_mode]):
         mode = start_mode

@@ -1,16 +1,35 @@
 """Compiled parts of the duals with a price per step; the mathematics is in step_prices.py."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.problem._battery_kernels import chemical_power, chemical_power_at, drain_and_slope
+from hevopt.problem._battery_kernels import (
+    BatteryArrays,
+    chemical_power,
+    chemical_power_at,
+    drain_and_slope,
+)
+from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.choices import Choices
 
 # A step's price is at most this multiple of the next one's; any prices are valid.
 _GROWTH_MAX = 10.0
 
 
+class WindowCells(NamedTuple):
+    """The window cut into cells. edges_j: (cell + 1,); per cell the highest voltage, the lowest resistances."""
+
+    edges_j: Array
+    voltage: Array
+    discharge_ohm: Array
+    charge_ohm: Array
+    efficiency: float
+
+
 @compiled()
-def costate(energy, power, step_s, battery):
+def costate(energy: Array, power: Array, step_s: Array, battery: BatteryArrays) -> Array:
     """Prices (time,) of x_1 ... x_T that make a rollout stationary, 1 at the end."""
     steps = len(power)
     price = np.ones(steps)
@@ -21,21 +40,35 @@ def costate(energy, power, step_s, battery):
 
 
 @compiled()
-def _worth_with_first_step(first, power, step_s, price, start, battery):
+def _worth_with_first_step(
+    choices: Choices, price: Array, start: float, battery: BatteryArrays
+) -> Array:
     """(entry,) with the first step's entries filled: there x is the start's, and has no price of its own."""
+    first, power = choices.first, choices.power_w
     worth = np.empty(len(power))
     for i in range(first[0, 0], first[0, -1]):
-        worth[i] = price[0] * step_s[0] * chemical_power_at(power[i], start, battery)
+        worth[i] = price[0] * choices.step_s[0] * chemical_power_at(power[i], start, battery)
     return worth
 
 
 @compiled()
-def worth_by_tangents(first, power, step_s, price, start, rollout, steep, low, high, battery):
+def worth_by_tangents(
+    choices: Choices,
+    price: Array,
+    start: float,
+    rollout: Array,
+    steep: Flags,
+    window: tuple[float, float],
+    battery: BatteryArrays,
+) -> Array:
     """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex and falling in x.
 
-    steep: (entry,) whether r is too steep somewhere for a tangent; then r is at least its value at `high`
+    rollout: (time + 1,) where a tangent touches beside those at the window's ends
+    steep: (entry,) whether r is too steep somewhere for a tangent; then r is at least its value at the upper end
     """
-    worth = _worth_with_first_step(first, power, step_s, price, start, battery)
+    first, power, step_s = choices.first, choices.power_w, choices.step_s
+    low, high = window
+    worth = _worth_with_first_step(choices, price, start, battery)
     for k in range(1, len(step_s)):
         after = price[k]
         tilt = price[k - 1] - after
@@ -63,7 +96,7 @@ def worth_by_tangents(first, power, step_s, price, start, rollout, steep, low, h
 
 
 @compiled()
-def _meeting(x1, y1, s1, x2, y2, s2):
+def _meeting(x1: float, y1: float, s1: float, x2: float, y2: float, s2: float) -> float:
     """Height at which a falling tangent at x1 meets a rising one at x2, never above it."""
     if s2 - s1 <= 0.0:
         return min(y1, y2)
@@ -74,11 +107,12 @@ def _meeting(x1, y1, s1, x2, y2, s2):
 
 @compiled()
 def worth_by_cells(
-    first, power, step_s, price, start, edges, voltage, discharge, charging, battery
-):
+    choices: Choices, price: Array, start: float, cells: WindowCells, battery: BatteryArrays
+) -> Array:
     """As worth_by_tangents, for any curves: the least over cells, r from below within each."""
-    worth = _worth_with_first_step(first, power, step_s, price, start, battery)
-    efficiency = battery.coulombic_efficiency
+    first, power, step_s = choices.first, choices.power_w, choices.step_s
+    edges, voltage, discharge, charging, efficiency = cells
+    worth = _worth_with_first_step(choices, price, start, battery)
     for k in range(1, len(step_s)):
         after = price[k]
         tilt = price[k - 1] - after
@@ -95,8 +129,11 @@ def worth_by_cells(
 
 
 @compiled()
-def linear_steps(first, power, step_s, energy, rollout_power, battery):
+def linear_steps(
+    choices: Choices, energy: Array, rollout_power: Array, battery: BatteryArrays
+) -> tuple[Array, Array]:
     """Fall of energy of every entry at the rollout, (entry,), and the share of x a step keeps, (time,)."""
+    first, power, step_s = choices.first, choices.power_w, choices.step_s
     drain = np.empty(len(power))
     keep = np.empty(len(step_s))
     for k in range(len(step_s)):
@@ -108,7 +145,7 @@ def linear_steps(first, power, step_s, energy, rollout_power, battery):
 
 
 @compiled()
-def lower_hull(step, drain, cost, order):
+def lower_hull(step: Indices, drain: Array, cost: Array, order: Indices) -> Flags:
     """(entry,) whether an entry is a corner of its step's lower hull of cost over drain, falling part.
 
     order: entries sorted by step, then drain, then cost. Mixtures of corners cost no more than any other entry.

@@ -34,15 +34,14 @@ ends with at least the asked charge.
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds import _lower_dp_kernels as kernels
 from hevopt.bounds.prices import EPSILON, bounded_choices, drain_magnitude_w
 from hevopt.bounds.step_prices import line_above, steep, window_cells
+from hevopt.problem.arrays import Array
 from hevopt.problem.choices import Choices, without_dominated
 from hevopt.problem.problem import Problem
 
-Array = NDArray[np.float64]
 _PIECES = 16
 _PIECES_CURVED = 256
 _PART_MOVES = 2**24
@@ -65,12 +64,12 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
     slope = _STEEPNESS * max(price_kgpj, 1e-12)
     terminal = slope * np.maximum(end - grid, 0.0)
     unreachable = _unreachable_kg(choices, terminal)
+    relaxation = kernels.Relaxation(slope * cell, unreachable)
     value = np.tile(terminal, (choices.modes, 1))
     for part in _parts(choices):
         value = kernels.lower_backward(
-            part.first, part.cost_kg, part.switch_kg, part.switch_allowed, value,
-            *_move_bounds(problem, part, grid, cell), slope * cell, unreachable,
-        )  # fmt: skip
+            part, value, _move_bounds(problem, part, grid, cell), relaxation
+        )
     bound = float(np.interp(problem.start_j, grid, value[problem.start_mode]))
     most = abs(unreachable) + slope * 4.0 * (grid[-1] - grid[0])
     return bound - 16.0 * EPSILON * choices.steps * most
@@ -88,27 +87,19 @@ def _parts(choices: Choices) -> Iterator[Choices]:
         yield choices.part(max(end - length, 0), end)
 
 
-def _move_bounds(
-    problem: Problem, choices: Choices, grid: Array, cell: float
-) -> tuple[NDArray[np.int64], Array, Array]:
-    """Nodes that part the window into pieces, and per entry and piece an upper bound of its move in cells:
-    offset + rise x node."""
+def _move_bounds(problem: Problem, choices: Choices, grid: Array, cell: float) -> kernels.Moves:
+    """Upper bounds of all moves over the pieces of a grid."""
     inside = problem.battery.within_window()
     line = line_above(inside)
     pieces = _PIECES_CURVED if line is None else _PIECES
     pieces = max(min(pieces, (len(grid) - 1) // 2), 1)
     breaks = np.arange(pieces + 1) * (len(grid) - 1) // pieces
-    listed = choices.first, choices.power_w, choices.step_s
+    parted = kernels.PartedGrid(float(grid[0]), cell, breaks, grid[breaks])
     if line is None:
-        edges, *best = window_cells(problem, pieces)
-        offset = kernels.moves_by_cells(
-            *listed, cell, grid[breaks], edges, *best, inside.coulombic_efficiency
-        )
+        offset = kernels.moves_by_cells(choices, parted, window_cells(problem, pieces))
         rise = np.zeros_like(offset)
     else:
-        offset, rise = kernels.moves_by_tangents(
-            *listed, steep(choices, line), grid[0], cell, breaks, *line.energy_j, line
-        )
+        offset, rise = kernels.moves_by_tangents(choices, steep(choices, line), parted, line)
     magnitude_w = drain_magnitude_w(choices, inside, tangents=line is not None)
     rounding = choices.spread(choices.step_s) * magnitude_w + float(np.abs(grid).max())
     nodes = len(grid)
@@ -117,7 +108,7 @@ def _move_bounds(
     furthest = offset + rise * breaks[1:]
     # A piece without a move, of a cell that the window does not touch, stays without.
     offset = np.where(far & np.isfinite(offset), np.clip(furthest, -nodes, nodes), offset)
-    return breaks, offset, np.where(far, 0.0, rise)
+    return kernels.Moves(breaks, offset, np.where(far, 0.0, rise))
 
 
 def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:

@@ -26,17 +26,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.errors import InfeasibleError
 from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import BatteryArrays
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, kept
+from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Problem
 
-Array = NDArray[np.float64]
 EPSILON = float(np.finfo(np.float64).eps)
 _LINES_MAX = 200
 _QUADRUPLINGS_MAX = 16
@@ -182,12 +182,13 @@ class _Priced:
 
     def line(self, scale: float) -> Line:
         """g's supporting line at a scale."""
-        value, path = self._shortest(self.choices.cost_kg + scale * self.worth, 1.0)
+        value, path = self._shortest(self.choices, self.choices.cost_kg + scale * self.worth)
         return Line(scale, value + scale * self.constant, self._slope(path), scale * self.end_price)
 
     def steepest(self) -> tuple[float, float]:
         """Cost and slope of the path whose priced part is least: g's line at a scale without end."""
-        _, path = self._shortest(self.worth, 0.0)
+        free = frozen("switching", np.zeros_like(self.choices.switch_kg))
+        _, path = self._shortest(self.choices._replace(switch_kg=free), self.worth)
         slope = self._slope(path)
         if slope > 0:
             raise InfeasibleError(
@@ -199,17 +200,13 @@ class _Priced:
         cost = self.choices.cost_kg[path] + table.switch_fuel_kg[before, mode]
         return float(np.sum(cost)), slope
 
-    def _shortest(self, value: Array, switching: float) -> tuple[float, NDArray[np.int64]]:
-        choices = self.choices
-        total, path, _ = shortest_path(
-            choices.first, value, switching * choices.switch_kg, choices.switch_allowed,
-            self.problem.start_mode,
-        )  # fmt: skip
+    def _shortest(self, choices: Choices, value: Array) -> tuple[float, Indices]:
+        total, path, _ = shortest_path(choices, value, self.problem.start_mode)
         if not np.isfinite(total):
             raise InfeasibleError(_no_path(choices, self.problem))
         return total, path
 
-    def _slope(self, path: NDArray[np.int64]) -> float:
+    def _slope(self, path: Indices) -> float:
         slope = float(np.sum(self.worth[path])) + self.constant
         # End charge that is missing by rounding alone must not send the price to infinity.
         return 0.0 if abs(slope) <= self.rounding_kg else slope

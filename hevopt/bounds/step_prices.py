@@ -29,18 +29,18 @@ lowest resistance.
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds import _step_prices_kernels as kernels
+from hevopt.bounds._step_prices_kernels import WindowCells
 from hevopt.bounds.prices import EPSILON, STEEPEST, Line, bounded_choices, dual, priced_rounding
 from hevopt.errors import SolverError
 from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import BatteryArrays
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.choices import Choices, without_dominated
 from hevopt.problem.problem import Problem, Trajectory
 
-Array = NDArray[np.float64]
 CELLS = 256
 # Longer drives are given to the linear program in parts: its time grows faster than their length.
 _LP_STEPS, _LP_OVERLAP = 4000, 1000
@@ -65,15 +65,16 @@ def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[L
     if not (np.isfinite(price).all() and (price >= 0).all()):
         raise SolverError("the prices of stored energy are not all finite and >= 0")
     choices = without_dominated(bounded_choices(problem))
-    inside, step_s = problem.battery.within_window(), problem.table.step_s
+    inside = problem.battery.within_window()
     line = line_above(inside)
-    arguments = choices.first, choices.power_w, step_s, price, problem.start_j
     if line is not None:
+        window = float(line.energy_j[0]), float(line.energy_j[1])
         worth = kernels.worth_by_tangents(
-            *arguments, rollout.energy_j, steep(choices, line), *line.energy_j, line
+            choices, price, problem.start_j, rollout.energy_j, steep(choices, line), window, line
         )
     else:
-        worth = kernels.worth_by_cells(*arguments, *window_cells(problem, CELLS), inside)
+        cells = window_cells(problem, CELLS)
+        worth = kernels.worth_by_cells(choices, price, problem.start_j, cells, inside)
     constant = price[-1] * problem.end_min_j - price[0] * problem.start_j
     rounding = priced_rounding(problem, choices, price, tangents=line is not None)
     return dual(problem, choices, worth, float(constant), float(price[-1]), rounding)
@@ -100,7 +101,7 @@ def line_above(inside: BatteryArrays) -> BatteryArrays | None:
     )  # fmt: skip
 
 
-def steep(choices: Choices, battery: BatteryArrays) -> NDArray[np.bool_]:
+def steep(choices: Choices, battery: BatteryArrays) -> Flags:
     """(entry,) whether a power comes so near the voltage's peak that no tangent is of use."""
     return battery_kernels.amplification(choices.power_w, battery) > STEEPEST
 
@@ -144,10 +145,8 @@ def _lp_part(
     from scipy.sparse import csr_array
 
     step = choices.spread(np.arange(choices.steps))
-    drain_j, keep_j = kernels.linear_steps(
-        choices.first, choices.power_w, choices.step_s, energy_j, power_w,
-        problem.battery.within_window(),
-    )  # fmt: skip
+    inside_window = problem.battery.within_window()
+    drain_j, keep_j = kernels.linear_steps(choices, energy_j, power_w, inside_window)
     order = np.lexsort((choices.cost_kg, drain_j, step))
     corner = order[kernels.lower_hull(step, drain_j, choices.cost_kg, order)[order]]
     step, drain_j, cost_kg = step[corner], drain_j[corner], choices.cost_kg[corner]
@@ -188,9 +187,8 @@ def _lp_part(
     return np.maximum(-result.ineqlin.marginals * (unit_kg / scale_j), 0.0)
 
 
-def window_cells(problem: Problem, cells: int) -> tuple[Array, Array, Array, Array]:
-    """Edges (cell + 1,) over the window, with every point of the curves among them, and per cell the highest
-    voltage and the lowest discharge and charge resistance."""
+def window_cells(problem: Problem, cells: int) -> WindowCells:
+    """At least that many cells, every point of the curves among their edges."""
     inside = problem.battery.within_window()
     even = np.linspace(inside.soc[0], inside.soc[-1], cells + 1)
     edges_soc = np.union1d(even, inside.soc)
@@ -198,7 +196,9 @@ def window_cells(problem: Problem, cells: int) -> tuple[Array, Array, Array, Arr
         np.interp(edges_soc, inside.soc, curve)
         for curve in (inside.open_circuit_v, inside.discharge_ohm, inside.charge_ohm)
     )
-    lower = [np.minimum(r[1:], r[:-1]) for r in (discharge, charge)]
     edges = battery_model.energy_j(problem.battery, edges_soc)
     edges[[0, -1]] = inside.energy_j[[0, -1]]
-    return edges, voltage[1:], *lower
+    return WindowCells(
+        edges, voltage[1:], *(np.minimum(ohm[1:], ohm[:-1]) for ohm in (discharge, charge)),
+        inside.coulombic_efficiency,
+    )  # fmt: skip

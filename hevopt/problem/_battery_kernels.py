@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt._compile import compiled
+from hevopt.problem.arrays import Array
 
 # Share of Uoc² by which rounding may carry a power beyond U²/4R, the most the voltage can deliver.
 _BEYOND_PEAK = 1e-9
@@ -16,17 +16,17 @@ _LEAST_ROOT = 1e-6
 class BatteryArrays(NamedTuple):
     """Battery curves over SOC as compiled loops read them; see battery.Battery."""
 
-    soc: NDArray[np.float64]
-    open_circuit_v: NDArray[np.float64]
-    discharge_ohm: NDArray[np.float64]
-    charge_ohm: NDArray[np.float64]
-    energy_j: NDArray[np.float64]
+    soc: Array
+    open_circuit_v: Array
+    discharge_ohm: Array
+    charge_ohm: Array
+    energy_j: Array
     capacity_as: float
     coulombic_efficiency: float
 
 
 @compiled(inline="always")
-def _segment_at(energy, battery):
+def _segment_at(energy: float, battery: BatteryArrays) -> int:
     i = 0
     while i < len(battery.energy_j) - 2 and energy >= battery.energy_j[i + 1]:
         i += 1
@@ -34,7 +34,7 @@ def _segment_at(energy, battery):
 
 
 @compiled(inline="always")
-def _state_in(i, energy, battery):
+def _state_in(i: int, energy: float, battery: BatteryArrays) -> tuple[float, float, float, float]:
     low_v = battery.open_circuit_v[i]
     width = battery.soc[i + 1] - battery.soc[i]
     slope = (battery.open_circuit_v[i + 1] - low_v) / width
@@ -48,13 +48,13 @@ def _state_in(i, energy, battery):
 
 
 @compiled(inline="always")
-def state_at(energy, battery):
+def state_at(energy: float, battery: BatteryArrays) -> tuple[float, float, float, float]:
     """SOC, open-circuit voltage, discharge and charge resistance at a stored energy."""
     return _state_in(_segment_at(energy, battery), energy, battery)
 
 
 @compiled(inline="always")
-def source_power(power, voltage, resistance):
+def source_power(power: float, voltage: float, resistance: float) -> tuple[float, float]:
     """Uoc I, and the root sqrt(Uoc² - 4 R P) = Uoc - 2 R I; NaN beyond what the voltage can deliver."""
     squared = voltage * voltage - 4.0 * resistance * power
     if squared < -_BEYOND_PEAK * voltage * voltage:
@@ -64,21 +64,23 @@ def source_power(power, voltage, resistance):
 
 
 @compiled(inline="always")
-def chemical_power(power, voltage, discharge, charging, efficiency):
+def chemical_power(
+    power: float, voltage: float, discharge: float, charging: float, efficiency: float
+) -> float:
     """Rate at which stored energy falls; NaN beyond what the voltage can deliver."""
     chemical, _ = source_power(power, voltage, charging if power < 0.0 else discharge)
     return efficiency * chemical if power < 0.0 else chemical
 
 
 @compiled()
-def chemical_power_at(power, energy, battery):
+def chemical_power_at(power: float, energy: float, battery: BatteryArrays) -> float:
     """Rate at which stored energy falls for a terminal power at a stored energy."""
     _, voltage, discharge, charging = state_at(energy, battery)
     return chemical_power(power, voltage, discharge, charging, battery.coulombic_efficiency)
 
 
 @compiled()
-def drain_and_slope(power, energy, battery):
+def drain_and_slope(power: float, energy: float, battery: BatteryArrays) -> tuple[float, float]:
     """Rate at which stored energy falls, and its derivative by stored energy within the segment.
 
     At constant P the current I obeys  dI/dU = -I / root,  dI/dR = I² / root,  so that of U I
@@ -101,7 +103,7 @@ def drain_and_slope(power, energy, battery):
 
 
 @compiled()
-def trace(start_j, power_w, step_s, battery):
+def trace(start_j: float, power_w: Array, step_s: Array, battery: BatteryArrays) -> Array:
     """Stored energy after every step, (time + 1,), by the step all parts of hevopt share."""
     energy = np.empty(len(power_w) + 1)
     energy[0] = start_j
@@ -111,7 +113,7 @@ def trace(start_j, power_w, step_s, battery):
 
 
 @compiled()
-def states(energy, battery):
+def states(energy: Array, battery: BatteryArrays) -> Array:
     """(4, n) SOC, open-circuit voltage, discharge and charge resistance at many stored energies."""
     result = np.empty((4, len(energy)))
     for n in range(len(energy)):
@@ -121,7 +123,7 @@ def states(energy, battery):
 
 
 @compiled()
-def source_powers(power, voltage, resistance):
+def source_powers(power: Array, voltage: Array, resistance: Array) -> Array:
     """(2, n) Uoc I and root of many powers, each at its own voltage and resistance."""
     result = np.empty((2, len(power)))
     for n in range(len(power)):
@@ -130,7 +132,7 @@ def source_powers(power, voltage, resistance):
 
 
 @compiled()
-def amplification(power, battery):
+def amplification(power: Array, battery: BatteryArrays) -> Array:
     """(n,) how much rounding of Uoc² can grow in the root, U / sqrt(U² - 4 R P), at most 1 / sqrt(epsilon).
 
     Of each segment between two points the lowest voltage and the highest resistance.

@@ -3,10 +3,11 @@
 import numpy as np
 
 from hevopt._compile import compiled
+from hevopt.problem.arrays import Array, Indices
 
 
 @compiled()
-def undominated(first, cost, power):
+def undominated(first: Indices, cost: Array, power: Array) -> tuple[Indices, Indices]:
     """Entries kept, by rising power within each block, and their new block starts."""
     steps, blocks = first.shape
     kept = np.empty(len(cost), dtype=np.int64)

@@ -10,13 +10,12 @@ closed form: Uoc² = Uoc_i² + 2 (dUoc/dSOC) (E - E_i) / Q within a segment.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.errors import DataError
 from hevopt.problem import _battery_kernels as kernels
 from hevopt.problem._battery_kernels import BatteryArrays
+from hevopt.problem.arrays import Array, Flags
 
-Array = NDArray[np.float64]
 # What simulate lets a plan leave the window by: shares of the window, or of all stored energy if that is more.
 _WINDOW_TOLERANCE, _ENERGY_ROUNDING = 1e-9, 4e-12
 # Rounding of a power given as the limit itself.
@@ -193,7 +192,7 @@ def power_limits_w(battery: Battery) -> tuple[float, float]:
     )
 
 
-def within_limits(battery: Battery, power_w: Array) -> NDArray[np.bool_]:
+def within_limits(battery: Battery, power_w: Array) -> Flags:
     """Where the battery can deliver or take a power at every SOC of its window, rounding aside."""
     least, greatest = power_limits_w(battery)
     return (power_w >= least * (1 + _ROUNDING)) & (power_w <= greatest * (1 + _ROUNDING))

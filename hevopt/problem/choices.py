@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from hevopt.errors import InfeasibleError
 from hevopt.problem._choices_kernels import undominated
+from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 class Choices(NamedTuple):
@@ -25,13 +24,13 @@ class Choices(NamedTuple):
     step_s: (time,); switch_kg, switch_allowed: (mode, mode) [from, to]
     """
 
-    first: NDArray[np.int64]
-    control: NDArray[np.int64]
+    first: Indices
+    control: Indices
     cost_kg: Array
     power_w: Array
     step_s: Array
     switch_kg: Array
-    switch_allowed: NDArray[np.bool_]
+    switch_allowed: Flags
 
     @property
     def steps(self) -> int:
@@ -92,7 +91,7 @@ def require_choices(problem: Problem, choices: Choices, strategy: str) -> None:
         )
 
 
-def require_path(problem: Problem, path: NDArray[np.int64], strategy: str) -> None:
+def require_path(problem: Problem, path: Indices, strategy: str) -> None:
     """InfeasibleError at the first step where a path of (time,) entries has none, -1."""
     if (path < 0).any():
         k = int(np.argmax(path < 0))
@@ -103,7 +102,7 @@ def require_path(problem: Problem, path: NDArray[np.int64], strategy: str) -> No
         )
 
 
-def kept(choices: Choices, mask: NDArray[np.bool_]) -> Choices:
+def kept(choices: Choices, mask: Flags) -> Choices:
     """The choices where an (entry,) mask holds."""
     before = np.concatenate([[0], np.cumsum(mask)])
     return choices._replace(

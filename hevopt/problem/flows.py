@@ -4,11 +4,10 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.frozen import frozen
-
-Array = NDArray[np.float64]
 
 
 class Flows(Mapping[str, Array]):
@@ -17,7 +16,7 @@ class Flows(Mapping[str, Array]):
     __slots__ = ()
 
     @abstractmethod
-    def along(self, control: NDArray[np.int64]) -> dict[str, Array]:
+    def along(self, control: Indices) -> dict[str, Array]:
         """name -> (time,) of one control per step."""
 
 
@@ -38,6 +37,6 @@ class GivenFlows(Flows):
     def __len__(self) -> int:
         return len(self._flows)
 
-    def along(self, control: NDArray[np.int64]) -> dict[str, Array]:
+    def along(self, control: Indices) -> dict[str, Array]:
         steps = np.arange(len(control))
         return {name: flow[steps, control] for name, flow in self._flows.items()}

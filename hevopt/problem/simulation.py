@@ -9,15 +9,14 @@ window is an error, never clipped. The end charge is not judged here: a row that
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hevopt.errors import InfeasibleError
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import trace
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.table import REJECT_WORDS, ControlTable
-
-Array = NDArray[np.float64]
 
 
 def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
@@ -60,7 +59,7 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     )
 
 
-def total_cost_kg(problem: Problem, control: NDArray[np.int64]) -> tuple[float, Array]:
+def total_cost_kg(problem: Problem, control: Indices) -> tuple[float, Array]:
     """Cost and stored energy of control indices, without the checks: for searches inside strategies."""
     table = problem.table
     steps = np.arange(len(control))
@@ -71,7 +70,7 @@ def total_cost_kg(problem: Problem, control: NDArray[np.int64]) -> tuple[float, 
     return float(cost), trace(problem.start_j, power_w, table.step_s, problem.battery.arrays)
 
 
-def _indices(table: ControlTable, plan: ArrayLike) -> NDArray[np.int64]:
+def _indices(table: ControlTable, plan: ArrayLike) -> Indices:
     """A plan as usable indices, (time,); InfeasibleError for what is none."""
     steps, controls = table.reject.shape
     allowed = f"allowed: whole numbers from 0 to {controls - 1}"
@@ -97,7 +96,7 @@ def _indices(table: ControlTable, plan: ArrayLike) -> NDArray[np.int64]:
     return control
 
 
-def _check_usable(table: ControlTable, control: NDArray[np.int64]) -> None:
+def _check_usable(table: ControlTable, control: Indices) -> None:
     reject = table.reject[np.arange(len(control)), control]
     if reject.any():
         k = int(np.argmax(reject != 0))

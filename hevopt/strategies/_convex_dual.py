@@ -11,13 +11,12 @@ solver's multipliers and are evaluated afresh: however inexact the solver, what 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hevopt.problem.arrays import Array
 from hevopt.problem.battery import source_power_w
 from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_parts import Cell, Hulls
 
-Array = NDArray[np.float64]
 # At the voltage's peak dr/dP has no end; any slope gives a tangent.
 _LEAST_ROOT = 1e-3
 

@@ -3,10 +3,11 @@
 import numpy as np
 
 from hevopt._compile import compiled
+from hevopt.problem.arrays import Array, Indices
 
 
 @compiled()
-def lower_hulls(first, cost, power):
+def lower_hulls(first: Indices, cost: Array, power: Array) -> tuple[Indices, Indices]:
     """Entries on the lower convex hull of cost over power, block by block, and their new block starts.
 
     Within a block power rises and cost falls (`without_dominated`); blocks are joined to (time, mode + 1).

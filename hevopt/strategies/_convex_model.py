@@ -15,15 +15,14 @@ w <= s_m U²(E_m / s_m); E is the sum of E_m. With one mode the share is 1.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.errors import InfeasibleError, SolverError
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import source_power_w
 from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_dual import dual_value_kg
 from hevopt.strategies._convex_parts import Cell, Hulls, cell_of
 
-Array = NDArray[np.float64]
 SOLVER = "CLARABEL"
 # Segments kept for the solver: those whose slope lies within this share of the expected price, else every fourth.
 _NEAR, _SPARSE = 0.1, 4
@@ -46,7 +45,7 @@ class Solution(NamedTuple):
 class _Lines(NamedTuple):
     """Segments of hulls: cost >= level + slope x power; all (segment,)."""
 
-    block: NDArray[np.int64]
+    block: Indices
     level_kg: Array
     slope_kgpw: Array
 
@@ -134,7 +133,7 @@ def _within_hulls(
     ]
 
 
-def _rows_of(column: NDArray[np.int64], value: Array, columns: int) -> Any:
+def _rows_of(column: Indices, value: Array, columns: int) -> Any:
     """Sparse matrix whose row i holds value[i] in column[i]."""
     from scipy.sparse import csr_array
 

@@ -3,14 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import best_voltage_and_resistance, energy_j
 from hevopt.problem.choices import Choices, without_dominated
 from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_kernels import lower_hulls
-
-Array = NDArray[np.float64]
 
 
 class Hulls(NamedTuple):
@@ -19,14 +17,14 @@ class Hulls(NamedTuple):
     step: (block,), rising; first: (block + 1,); cost_kg, power_w: (corner,); step_s: (time,)
     """
 
-    step: NDArray[np.int64]
-    first: NDArray[np.int64]
+    step: Indices
+    first: Indices
     cost_kg: Array
     power_w: Array
     step_s: Array
 
     @property
-    def block(self) -> NDArray[np.int64]:
+    def block(self) -> Indices:
         """(corner,) block of each corner."""
         return np.repeat(np.arange(len(self.step)), np.diff(self.first))
 
@@ -46,7 +44,7 @@ class Cell(NamedTuple):
     high_j: float
 
 
-def hulls_of(choices: Choices, modes: NDArray[np.int64] | None = None) -> Hulls:
+def hulls_of(choices: Choices, modes: Indices | None = None) -> Hulls:
     """Hulls of every mode that is open at a step; with (time,) `modes`, of that mode alone."""
     first = choices.first
     if modes is not None:

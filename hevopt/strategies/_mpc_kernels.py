@@ -1,18 +1,44 @@
 """Compiled parts of receding-horizon control: hulls, fits, the neutral price of what was seen, the choice."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.problem._battery_kernels import chemical_power, state_at
+from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
+from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.choices import Choices
+from hevopt.strategies._causal_kernels import State
+
+
+class Hulls(NamedTuple):
+    """Lower convex hulls of blocks: entries in order of drain, and where each block's begin, (time, block + 1)."""
+
+    entry: Indices
+    first: Indices
+
+
+class Aim(NamedTuple):
+    """What a choice is to come close to: price of drained energy, drain wanted and penalty on the distance."""
+
+    price_kgpj: float
+    drain_j: float
+    curvature: float
+
+
+class Ahead(NamedTuple):
+    """Charge at hand and what it is worth at a preview's end: price x unit x (-x + gain x²/2), x in units."""
+
+    charge: float
+    price_kgpj: float
+    gain: float
+    unit_j: float
 
 
 @compiled()
-def falling_hull(first, cost, drain):
-    """Lower convex hull of each block's cost over drained energy, where cost falls: its entries and their starts.
-
-    first: (time, block + 1); returns (hull entry,) in order of drain and (time, block + 1)
-    """
+def falling_hull(first: Indices, cost: Array, drain: Array) -> Hulls:
+    """Lower convex hull of each block's cost over drained energy, where cost falls; first: (time, block + 1)."""
     steps, blocks = first.shape[0], first.shape[1] - 1
     hull = np.empty(len(cost), dtype=np.int64)
     starts = np.empty_like(first)
@@ -38,11 +64,11 @@ def falling_hull(first, cost, drain):
                 hull[top] = i
                 top += 1
         starts[k, blocks] = top
-    return hull[:top], starts
+    return Hulls(hull[:top], starts)
 
 
 @compiled()
-def _parabola(x, y):
+def _parabola(x: Array, y: Array) -> tuple[float, float]:
     """Curvature (>= 0) and slope at 0 of the least-squares parabola through points; a line where there are two."""
     centre = np.mean(x)
     width = np.max(np.abs(x - centre))
@@ -60,10 +86,11 @@ def _parabola(x, y):
 
 
 @compiled()
-def fits(first, cost, drain, hull, starts):
+def fits(first: Indices, cost: Array, drain: Array, hulls: Hulls) -> Array:
     """(time, mode, 5) of each block: least drain, drain of least cost, greatest drain, curvature and slope at 0
     of a convex parabola through the hull of cost over drain; 0 where the block is empty.
     """
+    hull, starts = hulls
     steps, modes = first.shape[0], first.shape[1] - 1
     result = np.zeros((steps, modes, 5))
     for k in range(steps):
@@ -78,13 +105,16 @@ def fits(first, cost, drain, hull, starts):
 
 
 @compiled()
-def neutral_prices(hull, starts, cost, drain, seen, least_price):
+def neutral_prices(
+    hulls: Hulls, cost: Array, drain: Array, seen: Indices, least_price: float
+) -> Array:
     """(time,) price at which the steps seen by then, 0 to seen[k] - 1, would have drained nothing in all.
 
-    hull, starts: falling hulls of whole steps, all modes in one block. A step moves along its hull as the price
+    hulls: falling ones of whole steps, all modes in one block. A step moves along its hull as the price
     falls; the edges of all steps, steepest first, are walked until the drain is made good. Where the edges end
     before that, the last one counts.
     """
+    hull, starts = hulls
     slope, width = np.empty(len(hull)), np.empty(len(hull))
     result = np.empty(len(seen))
     edges, step, total = 0, 0, 0.0
@@ -104,7 +134,7 @@ def neutral_prices(hull, starts, cost, drain, seen, least_price):
 
 
 @compiled()
-def _merge(slope, width, edges, drain, cost):
+def _merge(slope: Array, width: Array, edges: int, drain: Array, cost: Array) -> int:
     """Put the edges of one hull among the first `edges` of slope and width, steepest first; their new number."""
     new = len(drain) - 1
     i, to = edges - 1, edges + new - 1
@@ -121,29 +151,32 @@ def _merge(slope, width, edges, drain, cost):
 
 @compiled()
 def best_mode_path(
-    first, cost, drain, switch_kg, allowed, start_mode, prices, price, gain, charge, unit
-):
-    """Of the shortest paths through a preview under each of `prices`, the one of least cost and terminal cost
-    price x unit x (-x + gain x²/2), x the charge at the end, in units; its total and entries (step,).
+    choices: Choices, drain: Array, start_mode: int, prices: Array, ahead: Ahead
+) -> tuple[float, Indices]:
+    """Of the shortest paths through a preview under each of `prices`, the one of least cost and terminal cost;
+    its total and entries (step,).
     """
-    begin, end = first[0, 0], first[-1, -1]
-    least_total, best = np.inf, np.zeros(len(first), dtype=np.int64)
+    charge, price, gain, unit = ahead
+    least_total, best = np.inf, np.zeros(len(choices.first), dtype=np.int64)
     for p in prices:
-        priced = cost[begin:end] + p * drain[begin:end]
-        value, path, _ = shortest_path(first - begin, priced, switch_kg, allowed, start_mode)
+        priced = choices.cost_kg + p * drain
+        value, path, _ = shortest_path(choices, priced, start_mode)
         if not np.isfinite(value):
             break
-        fall = np.sum(drain[begin + path])
+        fall = np.sum(drain[path])
         x = charge - fall / unit
         total = value - p * fall + price * unit * (0.5 * gain * x * x - x)
         if total < least_total:
-            least_total, best = total, begin + path
+            least_total, best = total, path
     return least_total, best
 
 
 @compiled()
-def reachable_band(start, least_drain, greatest_drain, low, high):
+def reachable_band(
+    start: float, least_drain: Array, greatest_drain: Array, window: tuple[float, float]
+) -> tuple[Array, Array]:
     """Bounds (step,) on energy: the window, opened just as far as the drains on hand cannot keep it."""
+    low, high = window
     steps = len(least_drain)
     bottom, top = np.empty(steps), np.empty(steps)
     below = above = start
@@ -155,11 +188,20 @@ def reachable_band(start, least_drain, greatest_drain, low, high):
 
 
 @compiled()
-def nearest_choice(choices, k, mode, modes, energy, band, slack, price, curvature, target, battery):
-    """Entry of least  cost + switching + price drain + curvature/2 (drain - target)²  among some modes.
+def nearest_choice(
+    choices: Choices,
+    k: int,
+    state: State,
+    modes: Indices,
+    band: Array,
+    aim: Aim,
+    battery: BatteryArrays,
+) -> int:
+    """Entry of least  cost + switching + price drain + curvature/2 (drain - wanted)²  among some modes.
 
     Only entries that lead within their mode's band (mode, 2) of stored energy; -1 where there is none.
     """
+    mode, energy = state
     least, chosen = np.inf, -1
     _, voltage, discharge, charging = state_at(energy, battery)
     for n in modes:
@@ -167,10 +209,10 @@ def nearest_choice(choices, k, mode, modes, energy, band, slack, price, curvatur
             drain = choices.step_s[k] * chemical_power(
                 choices.power_w[i], voltage, discharge, charging, battery.coulombic_efficiency
             )
-            if not band[n, 0] - slack <= energy - drain <= band[n, 1] + slack:
+            if not band[n, 0] <= energy - drain <= band[n, 1]:
                 continue
-            value = choices.cost_kg[i] + choices.switch_kg[mode, n] + price * drain
-            value += 0.5 * curvature * (drain - target) ** 2
+            value = choices.cost_kg[i] + choices.switch_kg[mode, n] + aim.price_kgpj * drain
+            value += 0.5 * aim.curvature * (drain - aim.drain_j) ** 2
             if value < least:
                 least, chosen = value, i
     return chosen

@@ -7,15 +7,14 @@ step k alone: those that start before the preview of step k ends. Later steps ch
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds.prices import drain_at_j
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, require_choices
 from hevopt.problem.problem import Problem
 from hevopt.problem.table import Signals
 from hevopt.strategies import _mpc_kernels as kernels
 
-Array = NDArray[np.float64]
 # A price must be positive to count in; this one holds while nothing seen trades cost for charge.
 _LEAST_PRICE_KGPJ = 1e-12
 # A step starts within the preview if it does so by more than rounding.
@@ -36,7 +35,7 @@ class Model:
     choices: Choices
     drain_j: Array
     fit: Array
-    end: NDArray[np.int64]
+    end: Indices
     price_kgpj: Array
     wanted_j: Array
 
@@ -47,17 +46,17 @@ def model_of(problem: Problem, horizon_s: float) -> Model:
     require_choices(problem, choices, "mpc")
     drain_j = drain_at_j(problem, choices, problem.start_j)
     listed = choices.cost_kg, drain_j
-    fit = kernels.fits(choices.first, *listed, *kernels.falling_hull(choices.first, *listed))
+    fit = kernels.fits(choices.first, *listed, kernels.falling_hull(choices.first, *listed))
     whole_steps = np.ascontiguousarray(choices.first[:, [0, -1]])
-    hull, starts = kernels.falling_hull(whole_steps, *listed)
+    hulls = kernels.falling_hull(whole_steps, *listed)
     end = np.searchsorted(time_s, time_s + horizon_s * (1 - _ROUNDING))
-    price = kernels.neutral_prices(hull, starts, *listed, end, _LEAST_PRICE_KGPJ)
-    cheapest_j = drain_j[hull[starts[:, 1] - 1]]
+    price = kernels.neutral_prices(hulls, *listed, end, _LEAST_PRICE_KGPJ)
+    cheapest_j = drain_j[hulls.entry[hulls.first[:, 1] - 1]]
     returned_j = _recoverable_j(problem.table.signals, cheapest_j, end - 1)
     return Model(choices, drain_j, fit, end, price, problem.end_min_j - returned_j)
 
 
-def _recoverable_j(signals: Signals | None, cheapest_j: Array, last: NDArray[np.int64]) -> Array:
+def _recoverable_j(signals: Signals | None, cheapest_j: Array, last: Indices) -> Array:
     """(time,) energy that braking from the speed of the preview's last step to rest would return.
 
     In proportion to the speed squared, at the rate of the braking seen so far: steps that slow down and whose

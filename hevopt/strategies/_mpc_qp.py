@@ -11,11 +11,10 @@ The multiplier of row t is the price of stored energy after step t; at the end i
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.errors import SolverError
+from hevopt.problem.arrays import Array
 
-Array = NDArray[np.float64]
 # A fixed rho and no time limit: the same input gives the same bits. rho adapted on the way fails on standstills.
 OSQP_SETTINGS = {
     "verbose": False, "eps_abs": 1e-5, "eps_rel": 1e-5, "max_iter": 4000, "check_termination": 25,

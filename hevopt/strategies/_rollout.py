@@ -5,40 +5,27 @@ two nodes make it a plain price on stored energy.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.errors import InfeasibleError, SolverError
 from hevopt.problem import battery as battery_model
+from hevopt.problem._battery_kernels import chemical_power_at
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices
 from hevopt.problem.problem import Problem
 from hevopt.strategies import _rollout_kernels as kernels
+from hevopt.strategies._reach_kernels import Reach, reachable
+from hevopt.strategies._rollout_kernels import Grid
 
-Array = NDArray[np.float64]
 # Moves per step before the search for a way round dead ends is given up.
 _MOVES_PER_STEP = 500
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reach:
-    """Stored energy, (time + 1, mode), between which the end can be reached; least > greatest: nowhere."""
-
-    least_j: Array
-    greatest_j: Array
-
-
 def reach_of(problem: Problem, choices: Choices, end_min_j: float) -> Reach:
     """From where an end charge can be reached; InfeasibleError where the start is not among it."""
-    low, high = problem.window_j
-    reach = Reach(
-        *kernels.reachable(
-            choices.first, choices.power_w, choices.step_s, choices.switch_allowed,
-            low, high, end_min_j, problem.battery.arrays,
-        )
-    )  # fmt: skip
-    mode, slack = problem.start_mode, 1e-12 * high
+    reach = reachable(choices, problem.window_j, end_min_j, problem.battery.arrays)
+    mode, slack = problem.start_mode, 1e-12 * problem.window_j[1]
     least, greatest = reach.least_j[0, mode], reach.greatest_j[0, mode]
     if not least - slack <= problem.start_j <= greatest + slack:
         raise InfeasibleError(_why_unreachable(problem, choices, end_min_j))
@@ -50,14 +37,10 @@ def roll(
     choices: Choices,
     reach: Reach,
     value_kg: Array,
-    grid_low_j: Array,
-    cell_j: float,
-) -> NDArray[np.int64]:
-    """Entries (time,) that follow a value function (time + 1, mode, node) at energies grid_low_j + cell_j node.
-
-    grid_low_j: (time + 1,)
-    """
-    return follow(problem, choices, reach, lambda step: (0, value_kg), grid_low_j, cell_j)
+    grid: Grid,
+) -> Indices:
+    """Entries (time,) that follow a value function (time + 1, mode, node)."""
+    return follow(problem, choices, reach, lambda step: (0, value_kg), grid)
 
 
 def follow(
@@ -65,9 +48,8 @@ def follow(
     choices: Choices,
     reach: Reach,
     block_of: Callable[[int], tuple[int, Array]],
-    grid_low_j: Array,
-    cell_j: float,
-) -> NDArray[np.int64]:
+    grid: Grid,
+) -> Indices:
     """As `roll`, with a value function that comes by blocks.
 
     block_of: step -> first step of its block, and (step + 1, mode, node) values from there on
@@ -77,14 +59,11 @@ def follow(
         np.full(steps, -1), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64),
         np.zeros(len(choices.cost_kg), dtype=bool), np.zeros(3, dtype=np.int64),
     )  # fmt: skip
+    battery = problem.battery.arrays
     progress.energy[0], progress.mode[0] = problem.start_j, problem.start_mode
     while 0 <= progress.at[0] < steps and progress.at[2] < budget:
         begin, value_kg = block_of(int(progress.at[0]))
-        kernels.rollout(
-            choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-            choices.switch_allowed, begin, value_kg, grid_low_j, cell_j, reach.least_j,
-            reach.greatest_j, problem.battery.arrays, progress, budget,
-        )  # fmt: skip
+        kernels.rollout(choices, begin, value_kg, grid, reach, battery, progress, budget)
     reached, furthest, moves = progress.at
     if reached == steps:
         return progress.path
@@ -137,7 +116,7 @@ def _advance(
             (bottom[origins].min(), power.max()),
             (top[origins].max(), power.min()),
         ):
-            drain = kernels.chemical_power_at(pick, energy, problem.battery.arrays)
+            drain = chemical_power_at(pick, energy, problem.battery.arrays)
             after = energy - choices.step_s[k] * drain
             new_bottom[n], new_top[n] = min(new_bottom[n], after), max(new_top[n], after)
     return new_bottom, new_top

@@ -1,102 +1,39 @@
-"""Compiled reachability, backward recursion and rollout, all on stored energy with the true battery step."""
+"""Compiled backward recursion and rollout, all on stored energy with the true battery step."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt._compile import compiled
-from hevopt.problem._battery_kernels import chemical_power, chemical_power_at, state_at
+from hevopt.problem._battery_kernels import (
+    BatteryArrays,
+    chemical_power,
+    state_at,
+)
+from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.choices import Choices
+from hevopt.strategies._reach_kernels import Reach
 
 # Divisions of the grid between which a move over curved battery characteristics is taken as linear.
 _PIECES = 24
 
 
-@compiled()
-def _may_turn(power, step, battery):
-    """Whether more stored energy before a step could leave less after it, its drain rising faster than the energy.
+class Grid(NamedTuple):
+    """Even grids of stored energy, one before each step and one at the end: low_j[k] + cell_j x node.
 
-    Per joule the drain rises by at most I² (dR/dSOC) / (sqrt(U² - 4 R P) Q): only where resistance rises.
+    low_j: (time + 1,)
     """
-    ohms = battery.charge_ohm if power < 0.0 else battery.discharge_ohm
-    for i in range(len(battery.soc) - 1):
-        rise = ohms[i + 1] - ohms[i]
-        if rise <= 0.0:
-            continue
-        low_v = battery.open_circuit_v[i]
-        root = low_v
-        if power > 0.0:
-            root = np.sqrt(max(low_v * low_v - 4.0 * ohms[i + 1] * power, 1e-12 * low_v * low_v))
-        current = 2.0 * abs(power) / (low_v + root)
-        width = battery.soc[i + 1] - battery.soc[i]
-        if step * current * current * rise / width >= root * battery.capacity_as:
-            return True
-    return False
+
+    low_j: Array
+    cell_j: float
 
 
-@compiled()
-def _energy_before(after, power, step, low, high, battery):
-    """Stored energy within [low, high] from which a step leads to `after`; clipped to the window.
+class Penalty(NamedTuple):
+    """What takes the place of infinity: per cell below a grid and above it, and where no path is known."""
 
-    What is left rises with what was stored (see _may_turn), so halving finds it where repetition does not settle.
-    """
-    energy = min(max(after, low), high)
-    for _ in range(100):
-        moved = after + step * chemical_power_at(power, energy, battery)
-        moved = min(max(moved, low), high)
-        if abs(moved - energy) <= 1e-12 * high:
-            return energy
-        energy = moved
-    for _ in range(100):
-        energy = 0.5 * (low + high)
-        if energy - step * chemical_power_at(power, energy, battery) < after:
-            low = energy
-        else:
-            high = energy
-    return energy
-
-
-@compiled()
-def reachable(first, power, step_s, allowed, low, high, end_min, battery):
-    """Least and greatest stored energy (time + 1, mode) from which the end can still be reached.
-
-    least > greatest where it cannot. Between them there may be gaps: the rollout goes back from those.
-    """
-    steps, modes = first.shape[0], first.shape[1] - 1
-    least = np.full((steps + 1, modes), np.inf)
-    greatest = np.full((steps + 1, modes), -np.inf)
-    slack = 1e-12 * high
-    least[steps, :] = end_min
-    greatest[steps, :] = high
-    for k in range(steps - 1, -1, -1):
-        for n in range(modes):
-            bottom, top = least[k + 1, n], greatest[k + 1, n]
-            if bottom > top:
-                continue
-            lowest, highest = np.inf, -np.inf
-            # The energy before a step grows with its power: what lies between two powers adds nothing.
-            least_w, most_w = np.inf, -np.inf
-            start, count = first[k, n], first[k, n + 1] - first[k, n]
-            for visit in range(count):
-                i = start + (count - visit) % count  # the first, the last, then inwards
-                if least_w <= power[i] <= most_w:
-                    continue
-                if _may_turn(power[i], step_s[k], battery):
-                    lowest, highest = low, high  # anywhere: the rollout tells
-                    break
-                a = _energy_before(bottom, power[i], step_s[k], low, high, battery)
-                b = _energy_before(top, power[i], step_s[k], low, high, battery)
-                after_a = a - step_s[k] * chemical_power_at(power[i], a, battery)
-                after_b = b - step_s[k] * chemical_power_at(power[i], b, battery)
-                if after_a > top + slack or after_b < bottom - slack:
-                    continue
-                lowest, highest = min(lowest, a), max(highest, b)
-                least_w, most_w = min(least_w, power[i]), max(most_w, power[i])
-            for m in range(modes):
-                if allowed[m, n]:
-                    least[k, m] = min(least[k, m], lowest)
-                    greatest[k, m] = max(greatest[k, m], highest)
-    return least, greatest
+    floor_kg: float
+    ceiling_kg: float
+    unreachable_kg: float
 
 
 class Progress(NamedTuple):
@@ -106,67 +43,105 @@ class Progress(NamedTuple):
     at: [present step, furthest step, moves made]
     """
 
-    path: NDArray[np.int64]
-    energy: NDArray[np.float64]
-    mode: NDArray[np.int64]
-    closed: NDArray[np.bool_]
-    at: NDArray[np.int64]
+    path: Indices
+    energy: Array
+    mode: Indices
+    closed: Flags
+    at: Indices
 
 
 @compiled()
-def rollout(first, cost, power, step_s, switch_kg, allowed, begin, value, grid_low, cell, least,
-            greatest, battery, progress, budget):  # fmt: skip
+def _best_choice(
+    choices: Choices,
+    k: int,
+    ahead: Array,
+    grid: Grid,
+    reach: Reach,
+    battery: BatteryArrays,
+    progress: Progress,
+) -> tuple[int, int, float]:
+    """Entry of least cost + switching + cost-to-go at step k, -1 where none is left; mode and energy after it.
+
+    ahead: (mode, node) cost-to-go after the step
+    """
+    first, modes, nodes = choices.first, choices.first.shape[1] - 1, ahead.shape[1]
+    least, greatest = reach
+    slack = 1e-12 * abs(greatest[-1, 0])
+    energy, mode = progress.energy[k], progress.mode[k]
+    best, chosen, chosen_mode, chosen_energy = np.inf, -1, 0, 0.0
+    _, voltage, discharge, charging = state_at(energy, battery)
+    for n in range(modes):
+        if not choices.switch_allowed[mode, n]:
+            continue
+        for i in range(first[k, n], first[k, n + 1]):
+            if progress.closed[i]:
+                continue
+            drain = chemical_power(
+                choices.power_w[i], voltage, discharge, charging, battery.coulombic_efficiency
+            )
+            after = energy - choices.step_s[k] * drain
+            if not (least[k + 1, n] - slack <= after <= greatest[k + 1, n] + slack):
+                continue
+            place = (after - grid.low_j[k + 1]) / grid.cell_j
+            j = min(max(int(np.floor(place)), 0), nodes - 2)
+            share = place - j
+            to_go = ahead[n, j] * (1.0 - share) + ahead[n, j + 1] * share
+            total = choices.cost_kg[i] + choices.switch_kg[mode, n] + to_go
+            if total < best:
+                best, chosen, chosen_mode, chosen_energy = total, i, n, after
+    return chosen, chosen_mode, chosen_energy
+
+
+@compiled()
+def rollout(
+    choices: Choices,
+    begin: int,
+    value: Array,
+    grid: Grid,
+    reach: Reach,
+    battery: BatteryArrays,
+    progress: Progress,
+    budget: int,
+) -> None:
     """Go on along a value function until its last step, or back out of its first one, `begin`.
 
-    value: (step + 1, mode, node) cost-to-go from `begin` on at stored energy grid_low[k] + cell x node, linear
-    between nodes and beyond them.
+    value: (step + 1, mode, node) cost-to-go from `begin` on, linear between nodes and beyond them
     A choice that leads where the end cannot be reached is not taken; a dead end is left the way it was
     entered and closed, so that with enough budget every path is tried.
     """
-    modes, nodes = first.shape[1] - 1, value.shape[2]
-    end = begin + len(value) - 1
-    slack = 1e-12 * abs(greatest[-1, 0])
+    first, end = choices.first, begin + len(value) - 1
     path, energy, mode, closed, at = progress
     k, furthest, moves = at[0], at[1], at[2]
     while begin <= k < end and moves < budget:
         moves += 1
-        best, chosen, chosen_mode, chosen_energy = np.inf, -1, 0, 0.0
         ahead = value[k + 1 - begin]
-        _, voltage, discharge, charging = state_at(energy[k], battery)
-        for n in range(modes):
-            if not allowed[mode[k], n]:
-                continue
-            for i in range(first[k, n], first[k, n + 1]):
-                if closed[i]:
-                    continue
-                drain = chemical_power(
-                    power[i], voltage, discharge, charging, battery.coulombic_efficiency
-                )
-                after = energy[k] - step_s[k] * drain
-                if not (least[k + 1, n] - slack <= after <= greatest[k + 1, n] + slack):
-                    continue
-                place = (after - grid_low[k + 1]) / cell
-                j = min(max(int(np.floor(place)), 0), nodes - 2)
-                share = place - j
-                to_go = ahead[n, j] * (1.0 - share) + ahead[n, j + 1] * share
-                total = cost[i] + switch_kg[mode[k], n] + to_go
-                if total < best:
-                    best, chosen, chosen_mode, chosen_energy = total, i, n, after
+        chosen, next_mode, next_energy = _best_choice(
+            choices, k, ahead, grid, reach, battery, progress
+        )
         if chosen < 0:
-            closed[first[k, 0] : first[k, modes]] = False
+            closed[first[k, 0] : first[k, -1]] = False
             k -= 1
             if k >= 0:
                 closed[path[k]] = True
             continue
         path[k] = chosen
-        energy[k + 1], mode[k + 1] = chosen_energy, chosen_mode
+        energy[k + 1], mode[k + 1] = next_energy, next_mode
         k += 1
         furthest = max(furthest, k)
     at[0], at[1], at[2] = k, furthest, moves
 
 
 @compiled()
-def _relax(best, value, cost, low, high, cells, share, share_slope):
+def _relax(
+    best: Array,
+    value: Array,
+    cost: float,
+    low: int,
+    high: int,
+    cells: int,
+    share: float,
+    share_slope: float,
+) -> None:
     """best[j] = min(best[j], cost + value at node j + cells + share_j) for low <= j < high."""
     ahead = value[low + cells : high + cells + 1]
     here = best[low:high]
@@ -177,7 +152,7 @@ def _relax(best, value, cost, low, high, cells, share, share_slope):
 
 
 @compiled()
-def _line(best, low, high, start, slope):
+def _line(best: Array, low: int, high: int, start: float, slope: float) -> None:
     """best[j] = min(best[j], start + slope (j - low)) for low <= j < high."""
     here = best[low:high]
     for j in range(high - low):
@@ -185,18 +160,25 @@ def _line(best, low, high, start, slope):
 
 
 @compiled()
-def _lower(best, other, extra):
+def _lower(best: Array, other: Array, extra: float) -> None:
     """best[j] = min(best[j], other[j] + extra)."""
     for j in range(len(best)):
         best[j] = min(best[j], other[j] + extra)
 
 
 @compiled()
-def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
-    """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away.
-
-    Beyond the bottom and the top node every cell costs floor_kg and ceiling_kg.
-    """
+def _shift(
+    best: Array,
+    value: Array,
+    cost: float,
+    low: int,
+    high: int,
+    start: float,
+    slope: float,
+    penalty: Penalty,
+) -> None:
+    """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away."""
+    floor_kg, ceiling_kg, _ = penalty
     nodes = len(value)
     j = low
     while j < high:
@@ -226,7 +208,9 @@ def _shift(best, value, cost, low, high, start, slope, floor_kg, ceiling_kg):
 
 
 @compiled()
-def _bends(grid_low, cell, nodes, battery):
+def _bends(
+    grid_low: float, cell: float, nodes: int, battery: BatteryArrays
+) -> tuple[Indices, Array]:
     """Nodes between which a move is taken as linear, and voltage and resistances there.
 
     The ends, where voltage is linear in SOC and resistance constant; else also _PIECES even divisions.
@@ -243,15 +227,17 @@ def _bends(grid_low, cell, nodes, battery):
 
 
 @compiled()
-def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low, cell, floor_kg,
-             ceiling_kg, unreachable_kg, battery):  # fmt: skip
-    """Cost-to-go (time + 1, mode, node) by value iteration over stored energy grid_low[k] + cell x node.
+def backward(
+    choices: Choices, terminal: Array, grid: Grid, penalty: Penalty, battery: BatteryArrays
+) -> Array:
+    """Cost-to-go (time + 1, mode, node) by value iteration over stored energy.
 
     terminal: (mode, node) cost-to-go after the last step.
     A choice moves every node by nearly the same energy; between the points of the battery's curves the move
     is taken as linear in the node, so that the inner loop runs over contiguous memory. Switching is added
     once per mode, after the minimum over the mode's choices.
     """
+    first, grid_low, cell = choices.first, grid.low_j, grid.cell_j
     steps, modes = first.shape[0], first.shape[1] - 1
     nodes = terminal.shape[1]
     value = np.empty((steps + 1, modes, nodes))
@@ -261,11 +247,11 @@ def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low,
     for k in range(steps - 1, -1, -1):
         breaks, states = _bends(grid_low[k], cell, nodes, battery)
         drift = (grid_low[k] - grid_low[k + 1]) / cell
-        scale = -step_s[k] / cell
+        scale = -choices.step_s[k] / cell
         for n in range(modes):
-            least[n] = unreachable_kg
+            least[n] = penalty.unreachable_kg
             for i in range(first[k, n], first[k, n + 1]):
-                p = power[i]
+                p = choices.power_w[i]
                 end = drift + scale * chemical_power(
                     p, states[0, 0], states[0, 1], states[0, 2], efficiency
                 )
@@ -278,12 +264,12 @@ def backward(first, cost, power, step_s, switch_kg, allowed, terminal, grid_low,
                     last = high + 1 if b == len(breaks) - 2 else high
                     slope = (end - start) / (high - low)
                     _shift(
-                        least[n], value[k + 1, n], cost[i], low, last, start, slope, floor_kg,
-                        ceiling_kg,
+                        least[n], value[k + 1, n], choices.cost_kg[i], low, last, start, slope,
+                        penalty,
                     )  # fmt: skip
         for m in range(modes):
-            value[k, m] = unreachable_kg
+            value[k, m] = penalty.unreachable_kg
             for n in range(modes):
-                if allowed[m, n]:
-                    _lower(value[k, m], least[n], switch_kg[m, n])
+                if choices.switch_allowed[m, n]:
+                    _lower(value[k, m], least[n], choices.switch_kg[m, n])
     return value

@@ -3,16 +3,21 @@
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.problem._battery_kernels import chemical_power_at
+from hevopt.problem._battery_kernels import BatteryArrays, chemical_power_at
+from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.choices import Choices
 
 
 @compiled()
-def load_point_choices(first, cost, power, nox, fired, charge_w, nox_cap_kgps, step_s):
+def load_point_choices(
+    choices: Choices, nox: Array, fired: Flags, charge_w: Array, nox_cap_kgps: float
+) -> Indices:
     """(level, time) entry of least cost among fired ones that charge at least charge_w[level] within the cap.
 
     Where none does: the entry within the cap that charges most; where none is within it, that of least NOx.
     -1 where the step has no fired entry at all.
     """
+    first, cost, power, step_s = choices.first, choices.cost_kg, choices.power_w, choices.step_s
     steps, levels = len(step_s), len(charge_w)
     chosen = np.full((levels, steps), -1, dtype=np.int64)
     for k in range(steps):
@@ -40,11 +45,19 @@ def load_point_choices(first, cost, power, nox, fired, charge_w, nox_cap_kgps, s
 
 
 @compiled()
-def drive(wanted, fallback, power, step_s, start_j, least_j, battery):
+def drive(
+    wanted: Indices,
+    fallback: Indices,
+    choices: Choices,
+    start_j: float,
+    least_j: float,
+    battery: BatteryArrays,
+) -> tuple[Indices, Array]:
     """Entries (time,) that take `wanted` while more than least_j is stored and else `fallback`, and the energy.
 
     wanted, fallback: (time,) entries; they agree where there is nothing to choose.
     """
+    power, step_s = choices.power_w, choices.step_s
     steps = len(step_s)
     entry = np.empty(steps, dtype=np.int64)
     energy = np.empty(steps + 1)

@@ -12,17 +12,15 @@ then share the cycle, changing once on the way, so that the end charge comes out
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds.prices import one_price_dual
 from hevopt.errors import DataError, InfeasibleError
+from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices, choices_of, require_choices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies import _rule_kernels as kernels
 
-Array = NDArray[np.float64]
-Entries = NDArray[np.int64]
 _CHARGE_LEVELS = 41
 # Electric driving stops here: this share of the SOC window above its lower end.
 _SOC_LEVEL_SHARE = 0.25
@@ -30,21 +28,21 @@ _SOC_LEVEL_SHARE = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rules:
-    """Entries that each rule would take, per step; -1 where a step has none.
+    """Indices that each rule would take, per step; -1 where a step has none.
 
     off, electric, recover: (time,); standing, launching, braking, power_w: (time,) class and wheel power
     """
 
     problem: Problem
     choices: Choices
-    off: Entries
-    electric: Entries
-    recover: Entries
-    standing: NDArray[np.bool_]
-    engaging: NDArray[np.bool_]
-    braking: NDArray[np.bool_]
+    off: Indices
+    electric: Indices
+    recover: Indices
+    standing: Flags
+    engaging: Flags
+    braking: Flags
     power_w: Array
-    fired: NDArray[np.bool_]
+    fired: Flags
     charge_w: Array
     price_kgpj: float
 
@@ -53,7 +51,7 @@ class Rules:
 class Outcome:
     """One member of a rule family: its controls, cost, NOx and end charge."""
 
-    control: Entries
+    control: Indices
     cost_kg: float
     nox_kg: float
     surplus_j: float
@@ -147,20 +145,19 @@ def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan
     return Plan(members[chosen][1].control, {"calibration": calibration, "chosen": chosen})
 
 
-def _engine_entries(rules: Rules, nox_cap_kgps: float) -> NDArray[np.int64]:
+def _engine_entries(rules: Rules, nox_cap_kgps: float) -> Indices:
     choices = rules.choices
     steps = choices.spread(np.arange(choices.steps))
     nox = rules.problem.table.nox_kg[steps, choices.control]
     shifted = kernels.load_point_choices(
-        choices.first, choices.cost_kg, choices.power_w, nox, rules.fired, rules.charge_w,
-        nox_cap_kgps, choices.step_s,
-    )  # fmt: skip
+        choices, nox, rules.fired, rules.charge_w, float(nox_cap_kgps)
+    )
     shifted = np.where(shifted >= 0, shifted, rules.recover)
     # Load-point shift is for driving; standing, the engine covers the electric load and no more.
     return np.where(rules.standing, shifted[0], shifted)
 
 
-def _outcome(rules: Rules, engine: Entries, threshold_w: float) -> Outcome:
+def _outcome(rules: Rules, engine: Indices, threshold_w: float) -> Outcome:
     choices, problem = rules.choices, rules.problem
     driving = ~rules.standing & ~rules.braking
     electric = driving & (rules.power_w <= threshold_w) & (rules.electric >= 0)
@@ -172,13 +169,7 @@ def _outcome(rules: Rules, engine: Entries, threshold_w: float) -> Outcome:
     low, high = problem.window_j
     level = low + _SOC_LEVEL_SHARE * (high - low)
     entry, energy = kernels.drive(
-        wanted,
-        rest,
-        choices.power_w,
-        choices.step_s,
-        problem.start_j,
-        level,
-        problem.battery.arrays,
+        wanted, rest, choices, problem.start_j, level, problem.battery.arrays
     )
     control = choices.control[entry]
     cost_kg, _ = total_cost_kg(problem, control)
@@ -193,12 +184,12 @@ def _outcome(rules: Rules, engine: Entries, threshold_w: float) -> Outcome:
     )
 
 
-def _modes(problem: Problem, control: Entries) -> tuple[Entries, Entries]:
+def _modes(problem: Problem, control: Indices) -> tuple[Indices, Indices]:
     mode = problem.table.mode[control]
     return np.concatenate([[problem.start_mode], mode[:-1]]), mode
 
 
-def _next_true(flags: NDArray[np.bool_], standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _next_true(flags: Flags, standing: Flags) -> Flags:
     """(time,) the flag of the first moving step at or after each step."""
     moving = np.flatnonzero(~standing)
     following = np.searchsorted(moving, np.arange(len(flags)))
@@ -208,7 +199,7 @@ def _next_true(flags: NDArray[np.bool_], standing: NDArray[np.bool_]) -> NDArray
     return result
 
 
-def _least(choices: Choices, figure: Array, allowed: NDArray[np.bool_]) -> Entries:
+def _least(choices: Choices, figure: Array, allowed: Flags) -> Indices:
     """(time,) entry of least figure among the allowed ones, -1 where there is none."""
     masked = np.where(allowed, figure, np.inf)
     least = _step_minimum(choices, masked)

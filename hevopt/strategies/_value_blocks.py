@@ -7,10 +7,8 @@ computed again, to the same bits, when the rollout enters it: twice the time, sa
 from collections.abc import Callable
 from math import isqrt
 
-import numpy as np
-from numpy.typing import NDArray
+from hevopt.problem.arrays import Array
 
-Array = NDArray[np.float64]
 # A table up to this size is kept whole.
 _WHOLE_BYTES = 2**29
 

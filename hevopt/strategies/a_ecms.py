@@ -29,15 +29,15 @@ the mean gap is 1.8 %, more than without, so it is off by default.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds.prices import drain_at_j
 from hevopt.errors import DataError
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.choices import choices_of, require_choices, require_path
+from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _causal_kernels as kernels
 
-Array = NDArray[np.float64]
 _HEATING_VALUE_JPKG = 42.9e6
 _ENGINE_EFFICIENCY, _CONVERSION_EFFICIENCY = 0.45, 0.94
 FEEDBACK = kernels.Feedback(
@@ -64,12 +64,12 @@ def solve(
     settings = feedback._replace(window_s=np.inf if window_s is None else float(window_s))
     choices = choices_of(problem)
     require_choices(problem, choices, "a_ecms")
-    low, high = problem.window_j
+    view = kernels.View(drain_at_j(problem, choices, problem.start_j), *_speed_and_braking(problem))
+    share_kg = frozen("switching", settings.start_share * choices.switch_kg)
     path, factor, recovered = kernels.adaptive(
-        choices.first, choices.cost_kg, choices.power_w, drain_at_j(problem, choices, problem.start_j),
-        choices.step_s, choices.switch_kg, choices.switch_allowed, *_speed_and_braking(problem),
-        problem.start_mode, problem.start_j, problem.end_min_j, low, high, settings,
-        problem.battery.arrays,
+        choices._replace(switch_kg=share_kg), view,
+        kernels.State(problem.start_mode, problem.start_j), problem.end_min_j, problem.window_j,
+        settings, problem.battery.arrays,
     )  # fmt: skip
     require_path(problem, path, "a_ecms")
     notes = settings._asdict() | {
@@ -81,7 +81,7 @@ def solve(
     return Plan(choices.control[path], notes)
 
 
-def _speed_and_braking(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
+def _speed_and_braking(problem: Problem) -> tuple[Array, Flags]:
     """(time,) speed and whether the wheels are braked; a table without signals counts as standing."""
     signals = problem.table.signals
     if signals is None:

@@ -19,19 +19,20 @@
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.bounds.prices import drain_at_j, dual, one_price_dual, step_maxima
 from hevopt.errors import InfeasibleError
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies._convex_model import SOLVER, Solution, optimum
 from hevopt.strategies._convex_parts import hulls_of
-from hevopt.strategies._rollout import Reach, reach_of, roll
+from hevopt.strategies._reach_kernels import Reach
+from hevopt.strategies._rollout import reach_of, roll
+from hevopt.strategies._rollout_kernels import Grid
 
-Array = NDArray[np.float64]
 ITERATIONS_MAX = 8
 # Rollouts are tried with each share by which the price rises over the band, and each height above the trajectory;
 # band and height are shares of the window.
@@ -53,7 +54,7 @@ class _Search:
         self.reach: Reach = reach_of(problem, self.choices, problem.end_min_j)
         self.best_cost_kg, self.best_control = np.inf, None
 
-    def follow(self, solution: Solution) -> NDArray[np.int64]:
+    def follow(self, solution: Solution) -> Indices:
         """(time,) modes of the shortest path under a solution's prices; rolls out around it on the way."""
         modes, price, to_go = _mode_path(self.problem, self.choices, solution)
         low, high = self.problem.window_j
@@ -71,7 +72,8 @@ class _Search:
         price = np.concatenate([price_kgpj[:1], price_kgpj])
         bend = stiffness * float(price.max()) * away**2 / (2 * _BAND * (high - low))
         value = to_go[:, :, None] - price[:, None, None] * away + bend
-        path = roll(self.problem, self.choices, self.reach, value, centre_j + away[0], cell)
+        grid = Grid(centre_j + away[0], cell)
+        path = roll(self.problem, self.choices, self.reach, value, grid)
         control = self.choices.control[path]
         cost_kg, _ = total_cost_kg(self.problem, control)
         if cost_kg < self.best_cost_kg:
@@ -111,14 +113,14 @@ def solve(problem: Problem) -> Plan:
     return Plan(search.best_control, notes)
 
 
-def _switching_kg(problem: Problem, modes: NDArray[np.int64]) -> float:
+def _switching_kg(problem: Problem, modes: Indices) -> float:
     before = np.concatenate([[problem.start_mode], modes[:-1]])
     return float(np.sum(problem.table.switch_fuel_kg[before, modes]))
 
 
 def _mode_path(
     problem: Problem, choices: Choices, solution: Solution
-) -> tuple[NDArray[np.int64], Array, Array]:
+) -> tuple[Indices, Array, Array]:
     """Modes (time,) of the shortest path under a solution's prices, the prices it took, its cost-to-go.
 
     Of the paths on both sides of the dual's top, the one whose energy departs less from the trajectory's.
@@ -134,10 +136,8 @@ def _mode_path(
         top = 1.0
     found = []
     for scale in (top * (1 - _BESIDE_TOP), top * (1 + _BESIDE_TOP)):
-        _, path, to_go = shortest_path(
-            choices.first, choices.cost_kg + scale * worth, choices.switch_kg,
-            choices.switch_allowed, problem.start_mode,
-        )  # fmt: skip
+        priced = choices.cost_kg + scale * worth
+        _, path, to_go = shortest_path(choices, priced, problem.start_mode)
         found.append((abs(float(np.sum(worth[path]))), scale, path, to_go))
     _, scale, path, to_go = min(found, key=lambda item: item[:2])
     return problem.table.mode[choices.control[path]], scale * solution.price_kgpj, to_go

@@ -15,18 +15,19 @@ The first grid spans the SOC window; the next ones ever narrower bands around th
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds.prices import one_price_dual, typical_price_kgpj
 from hevopt.errors import DataError
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, without_dominated
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies import _rollout_kernels as kernels
-from hevopt.strategies._rollout import Reach, follow, reach_of
+from hevopt.strategies._reach_kernels import Reach
+from hevopt.strategies._rollout import follow, reach_of
+from hevopt.strategies._rollout_kernels import Grid, Penalty
 from hevopt.strategies._value_blocks import ValueBlocks
 
-Array = NDArray[np.float64]
 ENERGY_NODES = 1001
 # Widths of the grids as shares of the SOC window; finer ones are tried while they gain this share of cost.
 _BANDS = (1.0, 0.1, 0.01, 0.003, 0.001)
@@ -72,7 +73,7 @@ def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -
 
 def _search(
     setting: _Setting, bands: tuple[float, ...], nodes: int
-) -> tuple[float, NDArray[np.int64], float]:
+) -> tuple[float, Indices, float]:
     """Cost and controls of the best path over all grids, and what the first grid promised."""
     problem, choices = setting.problem, setting.every
     low, high = problem.window_j
@@ -80,8 +81,8 @@ def _search(
     best_cost, best, promises = np.inf, None, []
     for band in bands:
         cell = band * (high - low) / (nodes - 1)
-        grid_low = _grid_low_j(problem, centre, cell, nodes)
-        path, promise = _solve_on_grid(setting, grid_low, cell, nodes)
+        grid = _grid_around(problem, centre, cell, nodes)
+        path, promise = _solve_on_grid(setting, grid, nodes)
         promises.append(promise)
         cost, energy_j = total_cost_kg(problem, choices.control[path])
         settled = best_cost - cost < _GAIN_WORTH_MORE * abs(cost) and len(promises) > 2
@@ -92,36 +93,33 @@ def _search(
     return best_cost, best, promises[0]
 
 
-def _grid_low_j(problem: Problem, centre_j: Array, cell_j: float, nodes: int) -> Array:
-    """(time + 1,) bottom of grids around a path, within the window, with the asked end charge as a node."""
+def _grid_around(problem: Problem, centre_j: Array, cell_j: float, nodes: int) -> Grid:
+    """Grids around a path, (time + 1,), within the window, with the asked end charge as a node."""
     low, high = problem.window_j
     bottom = np.clip(centre_j - cell_j * (nodes - 1) / 2, low, high - cell_j * (nodes - 1))
     below = np.floor((problem.end_min_j - bottom) / cell_j + 1e-9)
-    return problem.end_min_j - cell_j * below
+    return Grid(problem.end_min_j - cell_j * below, cell_j)
 
 
-def _solve_on_grid(
-    setting: _Setting, grid_low: Array, cell: float, nodes: int
-) -> tuple[NDArray[np.int64], float]:
+def _solve_on_grid(setting: _Setting, grid: Grid, nodes: int) -> tuple[Indices, float]:
     """Entries (time,) of the rollout on one grid, and the cost its value function promised."""
-    problem, choices, penalty = setting.problem, setting.choices, setting.penalty_kgpj
-    last_grid = grid_low[-1] + cell * np.arange(nodes)
-    terminal = penalty * np.maximum(problem.end_min_j - last_grid, 0.0)
-    unreachable = _unreachable_kg(choices, terminal)
+    problem, choices = setting.problem, setting.choices
+    last_grid = grid.low_j[-1] + grid.cell_j * np.arange(nodes)
+    terminal = setting.penalty_kgpj * np.maximum(problem.end_min_j - last_grid, 0.0)
+    per_cell = setting.penalty_kgpj * grid.cell_j
+    ceiling = per_cell if setting.hard_top else 0.0
+    penalty = Penalty(per_cell, ceiling, _unreachable_kg(choices, terminal))
+    battery = problem.battery.arrays
 
     def backward(begin: int, end: int, after: Array) -> Array:
-        return kernels.backward(
-            choices.first[begin:end], choices.cost_kg, choices.power_w, choices.step_s[begin:end],
-            choices.switch_kg, choices.switch_allowed, after, grid_low[begin : end + 1], cell,
-            penalty * cell, penalty * cell if setting.hard_top else 0.0, unreachable,
-            problem.battery.arrays,
-        )  # fmt: skip
+        part = Grid(grid.low_j[begin : end + 1], grid.cell_j)
+        return kernels.backward(choices.part(begin, end), after, part, penalty, battery)
 
     values = ValueBlocks(choices.steps, np.tile(terminal, (choices.modes, 1)), backward)
-    first_grid = grid_low[0] + cell * np.arange(nodes)
+    first_grid = grid.low_j[0] + grid.cell_j * np.arange(nodes)
     at_start = values.block_of(0)[1][0, problem.start_mode]
     promised = float(np.interp(problem.start_j, first_grid, at_start))
-    path = follow(problem, setting.every, setting.reach, values.block_of, grid_low, cell)
+    path = follow(problem, setting.every, setting.reach, values.block_of, grid)
     return path, promised
 
 

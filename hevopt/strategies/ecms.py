@@ -11,16 +11,16 @@ ends with at least the asked charge is taken.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.bounds.prices import drain_at_j, one_price_dual, typical_price_kgpj
+from hevopt.problem.arrays import Array
 from hevopt.problem.choices import choices_of
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies._rollout import reach_of, roll
+from hevopt.strategies._rollout_kernels import Grid
 
-Array = NDArray[np.float64]
 _FACTOR_TOLERANCE = 1e-7
 _BRACKET_STEPS_MAX = 60
 _HALVINGS_MAX = 100
@@ -45,20 +45,14 @@ class _Search:
         low, high = self.problem.window_j
         choices = self.choices
         priced = choices.cost_kg + choices.spread(price_kgpj) * self.drain_j
-        _, _, to_go = shortest_path(
-            choices.first,
-            priced,
-            choices.switch_kg,
-            choices.switch_allowed,
-            self.problem.start_mode,
-        )
+        _, _, to_go = shortest_path(choices, priced, self.problem.start_mode)
         # A mode without a way on is never entered: the reach is empty there.
         to_go = np.where(np.isfinite(to_go), to_go, 0.0)
         of_step = np.concatenate([price_kgpj[:1], price_kgpj])[:, None, None]
         value = to_go[:, :, None] - of_step * np.array([low, high])
         reach = self.bound_reach if to_the_end else self.free_reach
-        grid_low = np.full(choices.steps + 1, low)
-        path = roll(self.problem, choices, reach, value, grid_low, high - low)
+        grid = Grid(np.full(choices.steps + 1, low), high - low)
+        path = roll(self.problem, choices, reach, value, grid)
         control = choices.control[path]
         cost_kg, energy_j = total_cost_kg(self.problem, control)
         surplus = float(energy_j[-1]) - self.problem.end_min_j

@@ -20,17 +20,18 @@ Neutrality comes from the feedback alone: the end charge is near the asked one, 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem._battery_kernels import chemical_power_at
+from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.choices import Choices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _mpc_kernels as kernels
+from hevopt.strategies._causal_kernels import State
 from hevopt.strategies._mpc_model import Model, model_of
 from hevopt.strategies._mpc_qp import HorizonSolver, PreviewQp
-from hevopt.strategies._rollout_kernels import reachable
+from hevopt.strategies._reach_kernels import reachable
 
-Array = NDArray[np.float64]
 HORIZON_S = 20.0
 # Chosen once for all cars and cycles: 1 % of the fuel of 11 km is 6 % of the window of a 1.6 kWh pack, and a price
 # 9 % off turns a car from charging to discharging (dual prices of the shipped cycles differ by less).
@@ -65,8 +66,8 @@ class Controller:
         self.problem, self.model = problem, model
         self.solver = HorizonSolver()
         self.mode, self.energy_j = problem.start_mode, problem.start_j
-        self.low_j, self.high_j = problem.window_j
-        self.unit_j = (self.high_j - self.low_j) / _UNITS_PER_WINDOW
+        low_j, high_j = problem.window_j
+        self.unit_j = (high_j - low_j) / _UNITS_PER_WINDOW
         self.last_price_kgpj = float(model.price_kgpj[0])
 
     def decide(self, k: int) -> int:
@@ -86,30 +87,33 @@ class Controller:
         """Stored energy above the wanted, in units."""
         return (self.energy_j - self.model.wanted_j[k]) / self.unit_j
 
-    def _mode_path(self, k: int) -> NDArray[np.int64]:
+    def _mode_path(self, k: int) -> Indices:
         """(step,) modes of the best path through the preview; step 2 above."""
-        choices, end = self.model.choices, self.model.end[k]
+        part, drain_j = self._preview(k)
         here, price = self._charge(k), self.model.price_kgpj[k]
         shares = 1.0 - GAIN * (here / _UNITS_PER_WINDOW + _LADDER)
         prices = np.append(np.maximum(price * shares, 0.0), self.last_price_kgpj)
-        total, path = kernels.best_mode_path(
-            choices.first[k:end], choices.cost_kg, self.model.drain_j, choices.switch_kg,
-            choices.switch_allowed, self.mode, prices, price, GAIN / _UNITS_PER_WINDOW, here,
-            self.unit_j,
-        )  # fmt: skip
+        ahead = kernels.Ahead(here, float(price), GAIN / _UNITS_PER_WINDOW, self.unit_j)
+        total, path = kernels.best_mode_path(part, drain_j, self.mode, prices, ahead)
         if not np.isfinite(total):
             raise InfeasibleError(
                 f"mpc: no path over the modes through the preview at {self._place(k)}: a switch is forbidden "
                 "there; see switch_allowed of the table, lengthen the preview, or use dp"
             )
-        return self.problem.table.mode[choices.control[path]]
+        return self.problem.table.mode[part.control[path]]
 
-    def _powers(self, k: int, modes: NDArray[np.int64]) -> tuple[Array, Array]:
+    def _preview(self, k: int) -> tuple[Choices, Array]:
+        """The choices of the preview at step k, and their drain, (entry,)."""
+        choices, end = self.model.choices, int(self.model.end[k])
+        entries = slice(choices.first[k, 0], choices.first[end - 1, -1])
+        return choices.part(k, end), self.model.drain_j[entries]
+
+    def _powers(self, k: int, modes: Indices) -> tuple[Array, Array]:
         """Energy drawn and price of stored energy after the step, (step,), along a mode path; step 3 above."""
         unit, price, wanted_j = self.unit_j, self.model.price_kgpj[k], self.model.wanted_j[k]
         steps = np.arange(k, self.model.end[k])
         low, knee, greatest, curvature, slope = self.model.fit[steps, modes].T
-        bottom, top = kernels.reachable_band(self.energy_j, low, greatest, self.low_j, self.high_j)
+        bottom, top = kernels.reachable_band(self.energy_j, low, greatest, self.problem.window_j)
         qp = PreviewQp(
             curvature=np.maximum(curvature * unit / price, _LEAST_CURVATURE),
             slope=slope / price,
@@ -129,13 +133,14 @@ class Controller:
         least_curvature = _LEAST_CURVATURE * self.model.price_kgpj[k] / self.unit_j
         curvature = max(float(self.model.fit[k, mode, 3]), least_curvature)
         allowed = np.flatnonzero(self.model.choices.switch_allowed[self.mode])
-        slack = _ENERGY_ROUNDING * self.high_j
-        window = np.array([[self.low_j, self.high_j]] * self.model.choices.modes)
+        slack = _ENERGY_ROUNDING * self.problem.window_j[1] * np.array([-1.0, 1.0])
+        window = np.array([self.problem.window_j] * self.model.choices.modes)
+        state, aim = State(self.mode, self.energy_j), kernels.Aim(price_kgpj, target_j, curvature)
         for band in self._safe_band(k), window:
             for modes in np.array([mode]), allowed:
                 entry = kernels.nearest_choice(
-                    self.model.choices, k, self.mode, modes, self.energy_j, band, slack,
-                    price_kgpj, curvature, target_j, self.problem.battery.arrays,
+                    self.model.choices, k, state, modes, band + slack, aim,
+                    self.problem.battery.arrays,
                 )  # fmt: skip
                 if entry >= 0:
                     return entry
@@ -147,12 +152,10 @@ class Controller:
 
     def _safe_band(self, k: int) -> Array:
         """(mode, 2) stored energy after step k between which the window can be kept to the preview's end."""
-        choices, end = self.model.choices, self.model.end[k]
-        least, greatest = reachable(
-            choices.first[k:end], choices.power_w, choices.step_s[k:end], choices.switch_allowed,
-            self.low_j, self.high_j, self.low_j, self.problem.battery.arrays,
-        )  # fmt: skip
-        return np.column_stack([least[1], greatest[1]])
+        part, _ = self._preview(k)
+        window_j = self.problem.window_j
+        reach = reachable(part, window_j, window_j[0], self.problem.battery.arrays)
+        return np.column_stack([reach.least_j[1], reach.greatest_j[1]])
 
     def _place(self, k: int) -> str:
         return f"step {k} (t = {self.problem.table.time_s[k]:g} s)"

@@ -24,11 +24,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hevopt.bounds.prices import one_price_dual
 from hevopt.errors import DataError
 from hevopt.problem import battery as battery_model
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import (
     Choices,
     choices_of,
@@ -36,12 +36,12 @@ from hevopt.problem.choices import (
     require_path,
     without_dominated,
 )
+from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
+from hevopt.strategies import _policy_kernels as policies
 
-Array = NDArray[np.float64]
-Classes = NDArray[np.int64]
 ENERGY_NODES = 41
 SPEED_BIN_MPS = 5.0
 POWER_BIN_W = 6000.0
@@ -71,8 +71,8 @@ class Chain:
     speed_mps: Array
     power_w: Array
     transition: Array
-    rows: Classes
-    row_class: Classes
+    rows: Indices
+    row_class: Indices
     row_share: Array
 
 
@@ -91,13 +91,12 @@ def solve(
     recovered = RECOVERED_SHARE * _recovered_jpv2(training)
     chain = chain_of([_signals(other) for other in training])
     ahead, settled = _policy_map(problem, training, chain, price, recovered, nodes, memory_s)
-    low, high = problem.window_j
     every = choices_of(problem)
     require_choices(problem, every, "sdp")
     path = kernels.follow_map(
-        every.first, every.cost_kg, every.power_w, every.step_s, every.switch_kg,
-        every.switch_allowed, classes_of(chain, _signals(problem)), ahead, problem.start_mode,
-        problem.start_j, low, (high - low) / (nodes - 1), problem.battery.arrays,
+        every, classes_of(chain, _signals(problem)), ahead,
+        kernels.State(problem.start_mode, problem.start_j), _grid(problem, nodes),
+        problem.battery.arrays,
     )  # fmt: skip
     require_path(problem, path, "sdp")
     notes = {
@@ -131,7 +130,7 @@ def chain_of(signals: Sequence[Signals]) -> Chain:
     return Chain(*centres, visits / visits.sum(axis=1, keepdims=True), rows, row_class, share)
 
 
-def classes_of(chain: Chain, signals: Signals) -> Classes:
+def classes_of(chain: Chain, signals: Signals) -> Indices:
     """(time,) class of each step: standing, or the nearest centre in bins of speed and power."""
     away = ((signals.speed_mps[:, None] - chain.speed_mps) / SPEED_BIN_MPS) ** 2
     away += ((signals.wheel_power_w[:, None] - chain.power_w) / POWER_BIN_W) ** 2
@@ -140,7 +139,7 @@ def classes_of(chain: Chain, signals: Signals) -> Classes:
     return np.argmin(away, axis=1)
 
 
-def _representatives(member: Classes, power_w: Array) -> tuple[Classes, Classes]:
+def _representatives(member: Indices, power_w: Array) -> tuple[Indices, Indices]:
     """Rows that stand for each class, at even quantiles of its wheel power, and their classes."""
     rows = []
     for z in range(member.max() + 1):
@@ -157,34 +156,35 @@ def _policy_map(
 ) -> tuple[Array, bool]:  # fmt: skip
     """W (class, mode, node), and whether its relative values have settled."""
     low, high = problem.window_j
-    half, cell = (high - low) / 2, (high - low) / (nodes - 1)
+    grid, half = _grid(problem, nodes), (high - low) / 2
     rows = _joined_rows(training, chain.rows)
-    level = low + cell * np.arange(nodes)
+    level = low + grid.cell_j * np.arange(nodes)
+    listed = policies.Rows(chain.row_class, chain.row_share, rows.switch_kg)
     missing = (problem.end_min_j - recovered * chain.speed_mps[:, None] ** 2 - level) / half
     step_s = float(rows.step_s[0])
     stage = price * half / memory_s * step_s * missing**2
     value = np.repeat((half * price * (missing + 0.4 * missing**2))[:, None], rows.modes, axis=1)
     ahead, settled = np.empty_like(value), False
     for _ in range(_IMPROVEMENTS_MAX):
-        kernels.look_ahead(chain.transition, value, ahead)
-        policy = kernels.improve(
-            rows.first, rows.cost_kg, rows.power_w, rows.step_s, rows.switch_kg,
-            rows.switch_allowed, chain.row_class, ahead, low, cell, _EXCESS * price,
-            problem.battery.arrays,
-        )  # fmt: skip
+        policies.look_ahead(chain.transition, value, ahead)
+        policy = policies.improve(
+            rows, chain.row_class, ahead, grid, _EXCESS * price, problem.battery.arrays
+        )
         before = value
-        value = kernels.sweep(
-            _SWEEPS, chain.transition, *policy, rows.switch_kg, chain.row_class, chain.row_share,
-            stage, before,
-        )  # fmt: skip
+        value = policies.sweep(_SWEEPS, chain.transition, policy, listed, stage, before)
         settled = bool(np.ptp(value - before) <= _TOLERANCE * price * half)
         if settled:
             break
-    kernels.look_ahead(chain.transition, value, ahead)
+    policies.look_ahead(chain.transition, value, ahead)
     return ahead, settled
 
 
-def _joined_rows(training: Sequence[Problem], rows: Classes) -> Choices:
+def _grid(problem: Problem, nodes: int) -> kernels.SteadyGrid:
+    low, high = problem.window_j
+    return kernels.SteadyGrid(low, (high - low) / (nodes - 1))
+
+
+def _joined_rows(training: Sequence[Problem], rows: Indices) -> Choices:
     """The undominated choices of chosen rows of the joined training."""
     starts = np.concatenate([[0], np.cumsum([len(p.table.step_s) for p in training])])
     parts = []
@@ -202,10 +202,11 @@ def _stacked(parts: list[Choices]) -> Choices:
         for name in ("control", "cost_kg", "power_w", "step_s")
     }
     first = np.concatenate([part.first + end for part, end in zip(parts, ends[:-1], strict=True)])
+    joined["step_s"] = frozen("step_s", joined["step_s"])
     return parts[0]._replace(first=first, **joined)
 
 
-def _some_rows(choices: Choices, rows: Classes) -> Choices:
+def _some_rows(choices: Choices, rows: Indices) -> Choices:
     """Choices of some of the steps, in the order given."""
     first = choices.first[rows]
     counts = first[:, -1] - first[:, 0]
@@ -216,7 +217,7 @@ def _some_rows(choices: Choices, rows: Classes) -> Choices:
         control=choices.control[entry],
         cost_kg=choices.cost_kg[entry],
         power_w=choices.power_w[entry],
-        step_s=choices.step_s[rows],
+        step_s=frozen("step_s", choices.step_s[rows]),
     )
 
 

@@ -58,15 +58,13 @@ def backward_call(problem: Problem, nodes: int) -> tuple[Callable[[], object], i
     choices = without_dominated(choices_of(problem))
     low, high = problem.window_j
     cell = (high - low) / (nodes - 1)
-    grid_low = np.full(choices.steps + 1, low)
+    grid = kernels.Grid(np.full(choices.steps + 1, low), cell)
     terminal = 1e-7 * np.maximum(problem.end_min_j - low - cell * np.arange(nodes), 0.0)
 
     def call() -> object:
-        return kernels.backward(
-            choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-            choices.switch_allowed, np.tile(terminal, (choices.modes, 1)), grid_low, cell, 1e-7 * cell, 0.0, 1.0,
-            problem.battery.arrays,
-        )  # fmt: skip
+        after = np.tile(terminal, (choices.modes, 1))
+        penalty = kernels.Penalty(1e-7 * cell, 0.0, 1.0)
+        return kernels.backward(choices, after, grid, penalty, problem.battery.arrays)
 
     return call, len(choices.cost_kg) * nodes
 

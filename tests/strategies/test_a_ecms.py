@@ -6,6 +6,7 @@ from conftest import CYCLES, HYBRIDS
 from problems import random_problem, rows
 
 from hevopt import Battery, ControlTable, DataError, Problem, certify, simulate
+from hevopt.problem.choices import choices_of
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import a_ecms, dp
 
@@ -67,10 +68,11 @@ def test_the_moving_base_also_keeps_the_window_and_loses_little(problem_of):
 
 def test_a_factor_over_past_steps_matches_the_drain_that_is_asked():
     """Two controls a step, 1 g for 20 kJ more: below 0.05 mg/J every step drains, above none does."""
-    first = np.array([[0, 2], [2, 4]])
-    cost, drain = np.array([0.0, 1e-3, 0.0, 3e-3]), np.array([2e4, 0.0, 2e4, 0.0])
+    cost, drain = np.array([[0.0, 1e-3], [0.0, 3e-3]]), np.array([2e4, 0.0, 2e4, 0.0])
+    pack = Battery([0, 1], [100, 100], [0, 0], [0, 0], 3600.0)
+    choices = choices_of(Problem(ControlTable.from_arrays(cost, 0 * cost), pack, 0.5, 0.5))
     for wanted, expected in ((2.5e4, 5e-8), (1e4, 1.5e-7)):
-        factor = kernels.neutral_factor(first, cost, drain, 0, 2, wanted, 1e-8, 1e-6)
+        factor = kernels.neutral_factor(choices, drain, (0, 2), wanted, (1e-8, 1e-6))
         assert factor == pytest.approx(expected, rel=0.01)
 
 

@@ -68,9 +68,8 @@ def compare_with_twin(problem, ceiling, pieces, tolerance):
     cell = 0.9 * (high - low) / 200
     terminal = 1e-7 * np.maximum(problem.end_min_j - grid_low[-1] - cell * np.arange(201), 0)
     fast = kernels.backward(
-        choices.first, choices.cost_kg, choices.power_w, choices.step_s, choices.switch_kg,
-        choices.switch_allowed, np.tile(terminal, (choices.modes, 1)), grid_low, cell, 1e-4, ceiling,
-        1.0, pack.arrays,
+        choices, np.tile(terminal, (choices.modes, 1)), kernels.Grid(grid_low, cell),
+        kernels.Penalty(1e-4, ceiling, 1.0), pack.arrays,
     )  # fmt: skip
     plain = plain_backward(choices, terminal, grid_low, cell, 1e-4, ceiling, 1.0, pack, pieces)
     assert np.max(np.abs(fast - plain)) <= tolerance * np.ptp(plain[plain < 0.9])

@@ -156,9 +156,9 @@ def test_fit_finds_a_parabola_and_leaves_out_what_is_beaten():
     cost = 0.3 * drain**2 / 2 - 1.0 * drain
     cost[5:] = [5.0, 1.0]
     first = np.array([[0, 7]])
-    hull, starts = kernels.falling_hull(first, cost, drain)
-    assert hull.tolist() == [1, 2, 3, 0, 4] and starts.tolist() == [[0, 5]]
-    fit = kernels.fits(first, cost, drain, hull, starts)[0, 0]
+    hulls = kernels.falling_hull(first, cost, drain)
+    assert hulls.entry.tolist() == [1, 2, 3, 0, 4] and hulls.first.tolist() == [[0, 5]]
+    fit = kernels.fits(first, cost, drain, hulls)[0, 0]
     assert fit == pytest.approx([-1.0, 3.0, 4.0, 0.3, -1.0])
 
 
@@ -168,8 +168,8 @@ def test_neutral_price_of_what_was_seen():
         np.array([-1.0, 1.0, 0.0, 1.0, 2.0, -4.0]),
         np.array([6.0, 0.0, 3.0, 1.0, 0.0, 0.0]),
     )
-    hull, starts = kernels.falling_hull(np.array([[0, 2], [2, 5], [5, 6]]), cost, drain)
-    prices = kernels.neutral_prices(hull, starts, cost, drain, np.array([1, 2, 3]), 1e-12)
+    hulls = kernels.falling_hull(np.array([[0, 2], [2, 5], [5, 6]]), cost, drain)
+    prices = kernels.neutral_prices(hulls, cost, drain, np.array([1, 2, 3]), 1e-12)
     assert prices.tolist() == [3.0, 3.0, 1.0]
 
 

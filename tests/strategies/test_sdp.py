@@ -11,6 +11,7 @@ from hevopt import DataError, certify, simulate
 from hevopt.problem.problem import Plan
 from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
+from hevopt.strategies import _policy_kernels as policies
 from hevopt.strategies import dp, sdp
 
 HEATING_VALUE_JPKG = 42.9e6
@@ -113,15 +114,12 @@ def test_kernels_agree_with_a_plain_twin(problem_of):
     low, high = problem.window_j
     cell, classes = (high - low) / (nodes - 1), len(chain.speed_mps)
     ahead = np.random.default_rng(1).uniform(0, 1e-3, (classes, joined.modes, nodes))
-    policy = kernels.improve(
-        joined.first, joined.cost_kg, joined.power_w, joined.step_s, joined.switch_kg,
-        joined.switch_allowed, chain.row_class, ahead, low, cell, 1e-6, problem.battery.arrays,
-    )  # fmt: skip
+    policy = policies.improve(
+        joined, chain.row_class, ahead, kernels.SteadyGrid(low, cell), 1e-6, problem.battery.arrays
+    )
     value = np.empty_like(ahead)
-    kernels.evaluate(
-        *policy, joined.switch_kg, chain.row_class, chain.row_share, np.zeros((classes, nodes)),
-        ahead, value,
-    )  # fmt: skip
+    listed = policies.Rows(chain.row_class, chain.row_share, joined.switch_kg)
+    policies.evaluate(policy, listed, np.zeros((classes, nodes)), ahead, value)
     np.testing.assert_allclose(
         value[3], plain_value(problem, chain, joined, ahead, 3), rtol=1e-9, atol=1e-15
     )

@@ -37,7 +37,7 @@ def test_a_rollout_turns_back_over_the_edges_of_blocks(monkeypatch):
     problem = Problem(ControlTable.from_arrays(fuel, power, usable), battery, 0.5, 0.1)
     monkeypatch.setattr(_value_blocks, "_WHOLE_BYTES", 0)
     begun, compiled = [], kernels.rollout
-    monkeypatch.setattr(kernels, "rollout", lambda *a: (begun.append(a[6]), compiled(*a)))
+    monkeypatch.setattr(kernels, "rollout", lambda *a: (begun.append(a[1]), compiled(*a)))
     assert list(dp.solve(problem, nodes=61).control) == [1] + [0] * (steps - 1)
     assert begun[:9] == [0, 6, 12, 18, 24, 18, 12, 6, 0]
 
