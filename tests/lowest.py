@@ -63,6 +63,9 @@ TESTS = [
     "tests/car_files",
     "tests/checks",
     "tests/output",
+    "tests/files",
+    "tests/problem",
+    "tests/sweeps/store",
     "tests/pages/test_browser.py",
     "tests/sweeps/workers/test_backends.py",
 ]

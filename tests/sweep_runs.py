@@ -12,7 +12,7 @@ from pathlib import Path
 
 from hevopt.sweeps.plan.study_file import read_study
 from hevopt.sweeps.run import Execution, Watch, begin, plan_of, run_sweep
-from hevopt.sweeps.store.export import csv_of
+from hevopt.sweeps.store.export import cases_csv
 from hevopt.sweeps.store.lock import locked
 from hevopt.sweeps.store.reading import open_to_read
 from hevopt.sweeps.store.store import open_store
@@ -156,6 +156,6 @@ def check_sound(store):
 def table(store):
     """The cases of a store as lines of its table, without the seconds."""
     with open_to_read(store) as reader:
-        lines = list(csv.reader(io.StringIO(csv_of(reader).decode())))
+        lines = list(csv.reader(io.StringIO(cases_csv(reader).decode())))
     assert lines[0][-1] == "case_s"
     return [line[:-1] for line in lines]

@@ -130,9 +130,9 @@ class Files:
         if self._collector is not None:
             self._collector.observe(case, row, plan, trajectory)
         if self.steps is not None:
-            from hevopt.output.file_tables import step_columns
+            from hevopt.output.file_tables import step_frame
 
-            self._driven.append((row, step_columns(case, trajectory)))
+            self._driven.append((row, step_frame(case, trajectory)))
 
     def write(self, job: Job, comparison: "Comparison") -> tuple[list[str], dict[str, HevoptError]]:
         """Write all of them; a line for each, and the fronts and sensitivities that failed."""

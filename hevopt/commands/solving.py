@@ -135,8 +135,8 @@ def run(
         lost_proofs=study.lost_proofs(case),
     )
     if out is not None:
-        columns = outputs.step_columns(case, trajectory)
-        outputs.write_steps(out, comparison, columns, job.about)
+        steps = outputs.step_frame(case, trajectory)
+        outputs.write_steps(out, comparison, steps, job.about)
     if json:
         write(outputs.result_json(comparison, job.about))
         return

@@ -1,7 +1,5 @@
 """What `hevopt pareto` and `sensitivity` show and write."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,8 @@ from rich.text import Text
 
 from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle
-from hevopt.files.writing import csv_cells, write_whole
+from hevopt.files.frames import csv_of
+from hevopt.files.writing import write_whole
 from hevopt.studies.sensitivity import Effect, unsolved
 
 _EFFECTS_NOTES = """fuel: charge-corrected, change against the car as given. elasticity: per cent of fuel (NOx) per
@@ -27,15 +26,13 @@ SHORTFALL_NOTE = "Where the car cannot follow, each value drives on with less th
 
 def write_front(out: Path, figures: Mapping[str, Any]) -> None:
     """Points and outer front in one table; what has no meaning for a line is empty."""
+    import pandas as pd
+
     names = ["kind", "nox_weight", "strategy", "fuel_l_per_100km", "nox_mg_per_km", "bound_l_per_100km",
              "gap_percent", "certificate"]  # fmt: skip
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
     lines = [{"kind": "plan", **point} for point in figures["points"]]
     lines += [{"kind": "outer front", **corner} for corner in figures["outer"]]
-    writer.writerows(csv_cells(line.get(name) for name in names) for line in lines)
-    write_whole(out, text.getvalue().encode())
+    write_whole(out, csv_of(pd.DataFrame(lines, columns=names)))
 
 
 def front_table(figures: Mapping[str, Any]) -> Table:

@@ -6,7 +6,7 @@ Axis order is (time, control). Power > 0 flows towards the wheels; battery power
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery, energy_j, within_limits
 from hevopt.problem.table import Array, ControlTable, Reject
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +92,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """What a plan does, added up by simulate.
+    """What a plan does on its problem, added up by simulate.
 
     energy_j, soc: (time + 1,), stored energy and state of charge at the steps' ends
     mode, fuel_kg, nox_kg, battery_power_w: (time,); fuel includes the cost of switching in its step
@@ -97,6 +100,7 @@ class Trajectory:
     residuals: component -> (time,) power balance, in W, 0 up to rounding
     """
 
+    problem: Problem
     control: NDArray[np.int64]
     energy_j: Array
     soc: Array
@@ -123,3 +127,35 @@ class Trajectory:
     def end_j(self) -> float:
         """Stored energy left."""
         return float(self.energy_j[-1])
+
+    def to_frame(self) -> "pd.DataFrame":
+        """One line per step, units in the names; what is a state is told at the step's start and at its end.
+
+        Step k goes from time_s to time_s + step_s; speed_mps is its mean, powers and torques hold over it, fuel
+        and NOx are the step's own. mode: that of the step, which its control leads to. Signals, flows, residuals
+        and missing torque are there where the problem's table has them.
+        """
+        import pandas as pd
+
+        table = self.problem.table
+        columns: dict[str, Any] = {"time_s": table.time_s, "step_s": table.step_s}
+        if table.signals is not None:
+            speed = table.signals.speed_mps
+            columns |= {"distance_end_m": np.cumsum(speed * table.step_s), "speed_mps": speed}
+            columns |= {"gear": table.signals.gear, "clutch_open": table.signals.clutch_open}
+        columns |= {
+            "control": self.control,
+            "mode": self.mode,
+            **table.labels_of(self.control),
+            "soc_start": self.soc[:-1],
+            "soc_end": self.soc[1:],
+            "energy_start_j": self.energy_j[:-1],
+            "energy_end_j": self.energy_j[1:],
+        }
+        for name in ("fuel_kg", "switch_fuel_kg", "nox_kg", "battery_power_w"):
+            columns[name] = getattr(self, name)
+        columns |= self.flows
+        if table.missing_torque_nm is not None:
+            columns["missing_torque_nm"] = table.missing_torque_nm
+        residuals = {f"residual_{n.replace(' ', '_')}_w": r for n, r in self.residuals.items()}
+        return pd.DataFrame(columns | residuals)

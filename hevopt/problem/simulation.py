@@ -45,6 +45,7 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     flows = table.flows.along(control)
     flows |= _battery_flows(problem, energy_j, power_w)
     return Trajectory(
+        problem=problem,
         control=control,
         energy_j=energy_j,
         soc=battery_model.soc(problem.battery, energy_j),

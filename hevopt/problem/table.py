@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import IntFlag
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError
 from hevopt.problem.flows import Flows, GivenFlows
 from hevopt.problem.frozen import frozen
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -225,6 +228,40 @@ class ControlTable:
     def feasible(self) -> NDArray[np.bool_]:
         """(time, control) True where the control can be used."""
         return self.reject == 0
+
+    def labels_of(self, control: NDArray[np.int64]) -> dict[str, list]:
+        """Column name -> what the labels say of each of some controls; a gear of 0 is none, or the cycle's."""
+        labels = [self.controls[c] for c in control]
+        return {
+            "engine_on": [bool(label.engine_on) for label in labels],
+            "engine_gear_chosen": [label.engine_gear for label in labels],
+            "machine_gear": [label.machine_gear for label in labels],
+            "level": [label.level for label in labels],
+        }
+
+    def to_frame(self) -> "pd.DataFrame":
+        """One line per step and control, units in the names; rejected: why it cannot be used, or nothing."""
+        import pandas as pd
+
+        steps, controls = self.fuel_kg.shape
+        step, control = np.divmod(np.arange(steps * controls), controls)
+        bits, which = np.unique(self.reject, return_inverse=True)
+        words = [", ".join(w for bit, w in REJECT_WORDS.items() if bit & found) for found in bits]
+        return pd.DataFrame(
+            {
+                "step": step,
+                "time_s": self.time_s[step],
+                "step_s": self.step_s[step],
+                "control": control,
+                **self.labels_of(control),
+                "mode": self.mode[control],
+                "fuel_kg": self.fuel_kg.ravel(),
+                "nox_kg": self.nox_kg.ravel(),
+                "battery_power_w": self.battery_power_w.ravel(),
+                "feasible": self.feasible.ravel(),
+                "rejected": np.array(words, dtype=object)[which.ravel()],
+            }
+        )
 
 
 def _freeze(parts: Signals | ControlTable, types: Mapping[str, type], place: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from numbers import Real
 from pathlib import Path
 from types import NoneType
-from typing import Any, NamedTuple, Unpack, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, get_args
 
 import numpy as np
 
@@ -25,9 +25,13 @@ from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.strategies import strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
+from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row, against_reference, failed_row
 from hevopt.studies.settings import Keywords, Settings, settings_from
 from hevopt.studies.solved import check_horizon, run_case, strategies_for
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 
@@ -51,6 +55,10 @@ class Comparison:
     end_asked: Mapping[str, float] = field(default_factory=dict)
     lost_proofs: Mapping[str, str] = field(default_factory=dict)
     left_out: Sequence[str] = ()
+
+    def to_frame(self) -> "pd.DataFrame":
+        """The rows as a table of pandas, one line each: the cycle, then the fields of `Row`, units in the names."""
+        return rows_frame(self.cycle, self.rows)
 
 
 class Watch(NamedTuple):

@@ -49,7 +49,9 @@ def test_run_writes_a_trajectory_whose_columns_add_up_to_the_table(monkeypatch, 
     shown = next(line for line in out.splitlines() if "conventional" in line).split()[2]
     assert float(shown) == pytest.approx(litres, abs=6e-4)
     assert max(abs(float(row["residual_whole_car_w"])) for row in rows) < 1e-6
-    assert {"soc", "battery_power_w", "engine_torque_nm", "clutch_loss_w"} <= set(rows[0])
+    assert {"soc_start", "soc_end", "battery_power_w", "engine_torque_nm", "clutch_loss_w"} <= set(
+        rows[0]
+    )
 
 
 def test_cycles_and_architectures_are_listed(monkeypatch, capsys):

@@ -6,12 +6,14 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from command_line import call
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hevopt import DataError, build_problem, load_architecture, load_cycle, simulate, solve
+from hevopt.files.frames import csv_of
 from hevopt.output import file_tables as outputs
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row
@@ -56,11 +58,11 @@ def test_steps_read_back_to_the_same_bits_inputs_and_outputs_together(hevopt, su
     assert len(lines) == len(cycle.time_s) - 1
     for name, values in {
         "speed_start_mps": cycle.speed_mps[:-1], "speed_end_mps": cycle.speed_mps[1:], "grade": cycle.grade[:-1],
-        "fuel_kg": trajectory.fuel_kg, "soc_after": trajectory.soc[1:],
+        "fuel_kg": trajectory.fuel_kg, "soc_start": trajectory.soc[:-1], "soc_end": trajectory.soc[1:],
         "engine_torque_nm": trajectory.flows["engine_torque_nm"], "nox_kg": trajectory.nox_kg,
     }.items():  # fmt: skip
         assert [bits(line[name]) for line in lines] == [bits(value) for value in values], name
-    assert float(lines[-1]["distance_m"]) == pytest.approx(cycle.distance_m, rel=1e-12)
+    assert float(lines[-1]["distance_end_m"]) == pytest.approx(cycle.distance_m, rel=1e-12)
     assert suffix == ".json" or {line["cycle"] for line in lines} == {"short"}
     words = (
         "cycle",
@@ -69,8 +71,10 @@ def test_steps_read_back_to_the_same_bits_inputs_and_outputs_together(hevopt, su
         "gear",
         "open",
         "level",
-        "soc",
-        "after",
+        "start",
+        "end",
+        "control",
+        "mode",
         "grade",
         "upstream",
         "shared",
@@ -124,8 +128,8 @@ def test_any_number_is_written_to_its_last_bit_and_what_is_none_is_empty(
 ):
     path = tmp_path_factory.getbasetemp() / f"numbers{suffix}"
     comparison = Comparison("c", [Row("A", "dp", OK)])
-    columns = {"time_s": list(range(len(values))), "value_w": np.array(values)}
-    outputs.write_steps(path, comparison, columns, ABOUT)
+    steps = pd.DataFrame({"time_s": range(len(values)), "value_w": np.array(values)})
+    outputs.write_steps(path, comparison, steps, ABOUT)
     for line, value in zip(read(path), values, strict=True):
         if np.isfinite(value):
             assert bits(line["value_w"]) == bits(value)
@@ -145,10 +149,9 @@ def test_rows_of_failed_cases_have_empty_cells(tmp_path):
 
 def test_drives_with_different_columns_are_joined_with_gaps():
     first, second = Row("A", "dp", OK), Row("B", "dp", OK)
-    table = outputs.joined([(first, {"time_s": [0, 1], "x_w": [1, 2]}), (second, {"time_s": [0]})])
-    assert table == {
-        "architecture": ["A", "A", "B"], "strategy": ["dp"] * 3, "time_s": [0, 1, 0], "x_w": [1, 2, None],
-    }  # fmt: skip
+    driven = pd.DataFrame({"time_s": [0, 1], "x_w": [1.5, 2.5]}), pd.DataFrame({"time_s": [0]})
+    table = outputs.joined(list(zip((first, second), driven, strict=True)))
+    assert csv_of(table) == b"architecture,strategy,time_s,x_w\nA,dp,0,1.5\nA,dp,1,2.5\nB,dp,0,\n"
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from hevopt.files.writing import csv_cells
 from hevopt.studies.status import OK, Status
 from hevopt.sweeps.plan.jobs import BOUND, NOX_WEIGHT
 from hevopt.sweeps.plan.prune import Pruned
-from hevopt.sweeps.store.export import csv_of
+from hevopt.sweeps.store.export import cases_csv
 from hevopt.sweeps.store.reading import Record, inputs_in, open_to_read
 from hevopt.sweeps.store.reasons import Reasons
 
@@ -136,9 +136,9 @@ def load_sweep(path: Path) -> Sweep:
         unsolved = set(figures.number[np.isnan(figures.objective)].tolist())
         pruned = [found for found in reader.pruned() if found.design in unsolved]
         few = tally.counts.total() <= CASES_MAX
-        cases_csv = csv_of(reader) if few else None
+        cases = cases_csv(reader) if few else None
         return Sweep(
-            printable(path.name), _meta_shown(reader.meta()), figures, tally, pruned, cases_csv
+            printable(path.name), _meta_shown(reader.meta()), figures, tally, pruned, cases
         )
 
 

@@ -13,7 +13,7 @@ from hevopt.pages.sweep.page import sweep_page
 from hevopt.sweeps.plan.jobs import Outcome, Planned
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store import limits
-from hevopt.sweeps.store.export import csv_of
+from hevopt.sweeps.store.export import cases_csv
 from hevopt.sweeps.store.reading import open_to_read
 from hevopt.sweeps.store.store import open_store
 
@@ -44,7 +44,7 @@ def spoil(path, script):
 def read_all(path):
     """All that commands read of a store."""
     with open_to_read(path) as reader:
-        reader.counts(), reader.meta(), reader.pruned(), csv_of(reader)
+        reader.counts(), reader.meta(), reader.pruned(), cases_csv(reader)
     return sweep_page(load_sweep(path))
 
 
@@ -170,7 +170,7 @@ def test_files_are_named_without_folders_that_are_the_users(tmp_path):
         opened.add([ok("0dp"), Outcome("1dp", "failed", None, f"{folder}/short.csv: no", 1.0)])
     page = read_all(path)
     with open_to_read(path) as reader:
-        table = csv_of(reader).decode()
+        table = cases_csv(reader).decode()
     assert str(tmp_path) not in page + table
     assert "hevopt sweep study.toml" in page and "short.csv: no" in page
     assert ",a/e.toml," in table and ",b/e.toml," in table and "0,short.csv,dp" in table
