@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from hevopt import load_architecture
-from hevopt.car import engine as engine_model
 from hevopt.files.lookup import shipped_folder
 
 SHIPPED = shipped_folder("architectures")
@@ -32,11 +31,11 @@ def bench(torques=TORQUES, full: bool = True, wander_rpm: float = 0.0) -> np.nda
     """(point, 4) rpm, Nm, fuel and NOx in g/h of the shipped engine, as a bench measures it: line by line."""
     rng, rows = np.random.default_rng(1), []
     for rpm in SPEEDS:
-        top = float(engine_model.full_load_torque_nm(ENGINE, np.array(rpm * RPM)))
+        top = float(ENGINE.full_load_nm(np.array(rpm * RPM)))
         for torque in [t for t in torques if t < top] + [top] * full:
             held = rpm + rng.uniform(-wander_rpm, wander_rpm)
-            at = ENGINE, np.array(float(torque)), np.array(held * RPM)
-            flows = engine_model.fuel_kgps(*at), engine_model.nox_kgps(*at)
+            at = np.array(float(torque)), np.array(held * RPM)
+            flows = ENGINE.fuel_kgps(*at), ENGINE.nox_kgps(*at)
             rows.append([held, torque, *(float(flow) * 3.6e6 for flow in flows)])
     return np.array(rows)
 
@@ -51,7 +50,7 @@ def write(path: str, header: str, *columns) -> None:
 
 def write_motoring(path: str = "motoring.csv") -> None:
     rpm = np.array([850, 1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000])
-    write(path, "n [rpm],drag [Nm]", rpm, engine_model.drag_torque_nm(ENGINE, rpm * RPM))
+    write(path, "n [rpm],drag [Nm]", rpm, ENGINE.drag_nm(rpm * RPM))
 
 
 def component(path: str = "bench.toml") -> dict:

@@ -50,7 +50,7 @@ class Architecture:
     vehicle: Vehicle
     engine: Engine
     gearbox: Gearbox
-    machine: Machine
+    machines: tuple[Machine, ...]
     battery: Battery
     soc_start: float
     soc_end: float

@@ -4,14 +4,15 @@ from math import inf
 
 import numpy as np
 
-from hevopt.car.engine import Engine, EngineGrid, FuelCoefficients, NoxCoefficients
-from hevopt.car.machine import LossGrid, Machine, TorqueCurve
-from hevopt.car.scaling import scaled_engine, scaled_machine
+from hevopt.car.engine import Engine
+from hevopt.car.engine_laws import CompactLaw, EngineMap, FuelCoefficients, NoxCoefficients
+from hevopt.car.machine import Machine, TorqueCurve
+from hevopt.car.machine_laws import LossByCoefficients, LossByEfficiency, LossLaw, LossMap
 from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
 from hevopt.car_files.battery import BatteryFile, LinearVoltageFile
 from hevopt.car_files.car import CarFile
-from hevopt.car_files.engine import EngineFile
+from hevopt.car_files.engine import EngineFile, EngineGridFile
 from hevopt.car_files.fields import FullLoadFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.machine import LossMapFile, MachineFile
@@ -60,22 +61,8 @@ def vehicle_of(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
 def engine_of(data: EngineFile) -> Engine:
     """The engine of its file, scaled where the file says so."""
     rpm, gram = TO_SI["_rpm"][1], TO_SI["_g"][1]
-    if data.fuel_map is not None:
-        grid = data.fuel_map
-        fuel = EngineGrid(
-            np.array(grid.speed_rpm) * rpm,
-            np.array(grid.torque_nm),
-            np.array(grid.fuel_gps) * gram,
-            None if grid.nox_gps is None else np.array(grid.nox_gps) * gram,
-            np.array(grid.motoring_torque_nm),
-        )
-    else:
-        fuel = FuelCoefficients(**data.fuel_coefficients.model_dump())
-    nox = data.nox_coefficients
     engine = Engine(
         name=data.name,
-        displacement_m3=data.displacement_cm3 * TO_SI["_cm3"][1],
-        stroke_m=data.stroke_mm * TO_SI["_mm"][1],
         idle_radps=data.idle_rpm * rpm,
         inertia_kgm2=data.inertia_kgm2,
         start_fuel_kg=data.start_fuel_g * gram,
@@ -84,10 +71,32 @@ def engine_of(data: EngineFile) -> Engine:
         co2_kgpkg=data.fuel.co2_kgpkg,
         full_load_speed_radps=np.array(data.full_load.speed_rpm) * rpm,
         full_load_torque_nm=np.array(data.full_load.torque_nm),
-        fuel=fuel,
+        law=_engine_map(data.fuel_map) if data.fuel_map is not None else _compact_law(data),
+    )
+    return engine if data.scale is None else engine.scaled(data.scale.factor)
+
+
+def _engine_map(data: EngineGridFile) -> EngineMap:
+    gram = TO_SI["_g"][1]
+    return EngineMap(
+        np.array(data.speed_rpm) * TO_SI["_rpm"][1],
+        np.array(data.torque_nm),
+        np.array(data.fuel_gps) * gram,
+        None if data.nox_gps is None else np.array(data.nox_gps) * gram,
+        np.array(data.motoring_torque_nm),
+    )
+
+
+def _compact_law(data: EngineFile) -> CompactLaw:
+    nox = data.nox_coefficients
+    return CompactLaw(
+        displacement_m3=data.displacement_cm3 * TO_SI["_cm3"][1],
+        stroke_m=data.stroke_mm * TO_SI["_mm"][1],
+        heating_value_jpkg=data.fuel.heating_value_mjpkg * TO_SI["_mjpkg"][1],
+        speed_max_radps=data.full_load.speed_rpm[-1] * TO_SI["_rpm"][1],
+        fuel=FuelCoefficients(**data.fuel_coefficients.model_dump()),
         nox=None if nox is None else NoxCoefficients(**nox.model_dump()),
     )
-    return engine if data.scale is None else scaled_engine(engine, data.scale.factor)
 
 
 def gearbox_of(data: GearboxFile) -> Gearbox:
@@ -108,33 +117,37 @@ def gearbox_of(data: GearboxFile) -> Gearbox:
 
 def machine_of(data: MachineFile) -> Machine:
     """The machine of its file, scaled where the file says so."""
-    loss = (data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
-    if data.loss_map is not None:
-        loss = _loss_grid(data.loss_map)
     machine = Machine(
         data.name,
         data.power_max_w,
         data.torque_max_nm or inf,
         (data.speed_max_rpm or inf) * TO_SI["_rpm"][1],
         data.inertia_kgm2,
-        None if data.kind == "efficiency" else loss,
-        data.efficiency,
+        _loss_law(data),
         None if data.full_load is None else _torque_curve(data.full_load),
     )
-    return machine if data.scale is None else scaled_machine(machine, data.scale.factor)
+    return machine if data.scale is None else machine.scaled(data.scale.factor)
+
+
+def _loss_law(data: MachineFile) -> LossLaw:
+    if data.loss_map is not None:
+        return _loss_map(data.loss_map)
+    if data.efficiency is not None:
+        return LossByEfficiency(data.efficiency)
+    return LossByCoefficients(data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
 
 
 def _torque_curve(data: FullLoadFile) -> TorqueCurve:
     return TorqueCurve(np.array(data.speed_rpm) * TO_SI["_rpm"][1], np.array(data.torque_nm))
 
 
-def _loss_grid(data: LossMapFile) -> LossGrid:
+def _loss_map(data: LossMapFile) -> LossMap:
     torque, loss = np.array(data.torque_nm), np.array(data.loss_w)
     if data.symmetric:
         above = torque > 0
         torque = np.concatenate([-torque[above][::-1], torque])
         loss = np.hstack([loss[:, above][:, ::-1], loss])
-    return LossGrid(np.array(data.speed_rpm) * TO_SI["_rpm"][1], torque, loss)
+    return LossMap(np.array(data.speed_rpm) * TO_SI["_rpm"][1], torque, loss)
 
 
 def battery_of(data: BatteryFile) -> Battery:

@@ -89,7 +89,7 @@ class KeysOfKind:
 
 
 class ScaleFile(FileModel):
-    """Another size of the same design: one factor, called by any of its names; the law is in scaling.py."""
+    """Another size of the same design: one factor, called by any of its names; see car/engine.py."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 

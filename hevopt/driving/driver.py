@@ -6,7 +6,7 @@ Both depend on the engine alone, so that every architecture drives the same gear
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car.engine import Engine, full_load_torque_nm
+from hevopt.car.engine import Engine
 from hevopt.car.transmission import Gearbox, input_torque_nm
 from hevopt.car.vehicle import Vehicle
 from hevopt.driving.demand import Demand
@@ -24,7 +24,7 @@ def change_down(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearb
     for _ in range(len(gearbox.ratios) - 2):
         speed, need = _engine_speed_and_need(demand, gear, engine, gearbox)
         need = need + vehicle.auxiliary_power_w / _ALTERNATOR_EFFICIENCY_MIN / speed
-        short = (gear > 1) & (need > full_load_torque_nm(engine, speed))
+        short = (gear > 1) & (need > engine.full_load_nm(speed))
         lower = np.maximum(gear - 1, 1)
         lower_speed = gearbox.ratios[lower] * demand.wheel_speed_radps
         short &= lower_speed <= _SPEED_SHARE_MAX * engine.speed_max_radps

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
 from hevopt.car.architecture import Architecture
 from hevopt.car.transmission import input_torque_nm, output_torque_nm
 from hevopt.driving.demand import Demand
@@ -74,8 +72,8 @@ def machine_torques(
     around: Around | None = None,
 ) -> tuple[Array, tuple[str, ...], NDArray[np.bool_]]:
     """(time, level) machine torques, their labels, and (time,) whether there is any choice."""
-    idle = machine_model.generating_torque_nm(
-        architecture.machine, architecture.vehicle.auxiliary_power_w, joint.machine_speed_radps
+    idle = architecture.machines[0].generating_nm(
+        architecture.vehicle.auxiliary_power_w, joint.machine_speed_radps
     )
     idle = np.nan_to_num(idle)
     if architecture.coupling.kind == "none":
@@ -87,7 +85,7 @@ def machine_torques(
     labels = tuple(f"{share:.3f}" for share in shares)
     if not joint.engine_on:
         return torque, labels, spread
-    best_engine = engine_model.best_torque_nm(architecture.engine, joint.engine_speed_radps)
+    best_engine = architecture.engine.best_nm(joint.engine_speed_radps)
     best = machine_torque_at(architecture, demand, joint, best_engine)
     least = least_engine_torque(architecture, joint)
     cut = machine_torque_at(architecture, demand, joint, least)
@@ -104,15 +102,15 @@ def machine_torque_range(
     architecture: Architecture, demand: Demand, joint: Joint
 ) -> tuple[Array, Array]:
     """(time,) lowest and highest machine torque that the limits of engine and machine leave open."""
-    machine, speed = architecture.machine, joint.machine_speed_radps
+    machine, speed = architecture.machines[0], joint.machine_speed_radps
     usable = joint.connected & (speed <= machine.speed_max_radps)
-    limit = np.where(usable, machine_model.torque_limit_nm(machine, speed), 0.0)
+    limit = np.where(usable, machine.limit_nm(speed), 0.0)
     apart = machine_torque_at(architecture, demand, joint, np.zeros_like(limit))
     low = high = apart
     if joint.engine_on:
         transmits = joint.locked | joint.slipping
         least = least_engine_torque(architecture, joint)
-        full = engine_model.covered_torque_nm(architecture.engine, joint.engine_speed_radps)
+        full = architecture.engine.covered_nm(joint.engine_speed_radps)
         full = np.where(np.isnan(full), np.maximum(least, 0.0), full)
         low = np.where(transmits, machine_torque_at(architecture, demand, joint, full), apart)
         high = np.where(transmits, machine_torque_at(architecture, demand, joint, least), apart)
@@ -127,7 +125,7 @@ def least_engine_torque(architecture: Architecture, joint: Joint) -> Array:
 
     0 too at speeds beyond a measured map's, where no torque of the engine is used.
     """
-    drag = engine_model.drag_torque_nm(architecture.engine, joint.engine_speed_radps)
+    drag = architecture.engine.drag_nm(joint.engine_speed_radps)
     return np.where(joint.locked & ~np.isnan(drag), drag, 0.0)
 
 
@@ -140,7 +138,7 @@ def machine_torque_at(
     joined = input_torque_nm(wanted, ratio, efficiency) - from_engine
     rest = wanted - output_torque_nm(from_engine, ratio, efficiency)
     own = input_torque_nm(rest, joint.machine_ratio, joint.machine_efficiency)
-    inertia = architecture.machine.inertia_kgm2 * joint.machine_accel_radps2
+    inertia = architecture.machines[0].inertia_kgm2 * joint.machine_accel_radps2
     return np.where(joint.upstream | joint.shared, joined, own) + inertia
 
 
@@ -153,7 +151,7 @@ def balance(architecture: Architecture, demand: Demand, joint: Joint, machine_nm
     least = _column(least_engine_torque(architecture, joint))
 
     machine_accel = _column(joint.machine_accel_radps2)
-    net = machine_nm - architecture.machine.inertia_kgm2 * machine_accel
+    net = machine_nm - architecture.machines[0].inertia_kgm2 * machine_accel
     own_ratio, own_efficiency = _column(joint.machine_ratio), _column(joint.machine_efficiency)
     own = output_torque_nm(net, own_ratio, own_efficiency)
     own = np.where(upstream | shared, 0.0, own)
@@ -173,18 +171,14 @@ def balance(architecture: Architecture, demand: Demand, joint: Joint, machine_nm
 
 def deliverable_nm(architecture: Architecture, demand: Demand, joint: Joint) -> Array:
     """(time,) largest wheel torque of the joint, machine at its limit, engine at full load or its map's end."""
-    machine, speed = architecture.machine, joint.machine_speed_radps
+    machine, speed = architecture.machines[0], joint.machine_speed_radps
     motoring = architecture.functions & {"e_boost", "nox_cut", "power_management"}
     usable = joint.connected & (speed <= machine.speed_max_radps) & bool(motoring)
-    top = np.where(usable, machine_model.torque_limit_nm(machine, speed), 0.0)
+    top = np.where(usable, machine.limit_nm(speed), 0.0)
     if architecture.coupling.kind == "none":
-        top = np.nan_to_num(
-            machine_model.generating_torque_nm(
-                machine, architecture.vehicle.auxiliary_power_w, speed
-            )
-        )
+        top = np.nan_to_num(machine.generating_nm(architecture.vehicle.auxiliary_power_w, speed))
     net = top - machine.inertia_kgm2 * joint.machine_accel_radps2
-    covered = engine_model.covered_torque_nm(architecture.engine, joint.engine_speed_radps)
+    covered = architecture.engine.covered_nm(joint.engine_speed_radps)
     full = covered - architecture.engine.inertia_kgm2 * joint.engine_accel_radps2
     transmits = (joint.locked | joint.slipping) & joint.engine_on & ~np.isnan(covered)
     transmits &= joint.engine_speed_radps <= architecture.engine.speed_max_radps

@@ -92,7 +92,7 @@ def gearbox_output(arch: Architecture, demand: Demand, clutch: _Clutch) -> Itera
     speed = ratio * demand.wheel_speed_radps
     connected = speed > 0
     if arch.coupling.disconnects_above_speed_max:
-        connected = connected & (speed <= arch.machine.speed_max_radps)
+        connected = connected & (speed <= arch.machines[0].speed_max_radps)
     yield _joint(
         clutch,
         upstream=np.False_,

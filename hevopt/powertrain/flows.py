@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
 from hevopt.car.architecture import Architecture
 from hevopt.car.transmission import output_torque_nm
 from hevopt.driving.demand import Demand
@@ -77,11 +75,11 @@ class PowerFlows(Flows):
         engine_kgps = np.zeros_like(machine_nm)
         torques = balance(self.architecture, self.demand, joint, machine_nm)
         if joint.engine_on:
-            engine_kgps = engine_model.fuel_kgps(
-                self.architecture.engine, torques.engine, joint.engine_speed_radps[:, None]
+            engine_kgps = self.architecture.engine.fuel_kgps(
+                torques.engine, joint.engine_speed_radps[:, None]
             )
-        loss_w = machine_model.loss_w(
-            self.architecture.machine, machine_nm, joint.machine_speed_radps[:, None]
+        loss_w = self.architecture.machines[0].loss_w(
+            machine_nm, joint.machine_speed_radps[:, None]
         )
         return _flows(
             self.architecture, self.demand, joint, torques, np.nan_to_num(engine_kgps),
@@ -107,7 +105,7 @@ def _flows(
     fuel_power = fuel_kgps * architecture.engine.heating_value_jpkg
     machine_power = torques.machine * machine_speed
     engine_inertia = architecture.engine.inertia_kgm2 * joint.engine_accel_radps2[:, None]
-    machine_inertia = architecture.machine.inertia_kgm2 * joint.machine_accel_radps2[:, None]
+    machine_inertia = architecture.machines[0].inertia_kgm2 * joint.machine_accel_radps2[:, None]
     own_loss = _gear_loss_w(torques.machine_net * machine_speed, joint.machine_efficiency[:, None])
     return {
         "engine_torque_nm": torques.engine,

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
 from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle
 from hevopt.driving.demand import Demand, demand_of
@@ -172,14 +170,12 @@ def _branch(
     fuel_kgps = nox_kgps = np.zeros_like(torques.machine)
     if joint.engine_on:
         speed = joint.engine_speed_radps[:, None]
-        fuel_kgps = engine_model.fuel_kgps(engine, torques.engine, speed)
-        nox_kgps = engine_model.nox_kgps(engine, torques.engine, speed)
+        fuel_kgps = engine.fuel_kgps(torques.engine, speed)
+        nox_kgps = engine.nox_kgps(torques.engine, speed)
         nox_kgps = np.where(fuel_kgps == 0, 0.0, nox_kgps)
     off_map = np.isnan(fuel_kgps) | np.isnan(nox_kgps)
     fuel_kgps, nox_kgps = np.nan_to_num(fuel_kgps), np.nan_to_num(nox_kgps)
-    loss_w = machine_model.loss_w(
-        architecture.machine, torques.machine, joint.machine_speed_radps[:, None]
-    )
+    loss_w = architecture.machines[0].loss_w(torques.machine, joint.machine_speed_radps[:, None])
     electric_w = torques.machine * joint.machine_speed_radps[:, None] + np.nan_to_num(loss_w)
     battery_power_w = electric_w + architecture.vehicle.auxiliary_power_w
     # What an alternator that follows its load leaves to the battery is rounding, not charge.

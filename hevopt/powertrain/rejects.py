@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
 from hevopt.car.architecture import Architecture
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.balance import Balance
@@ -24,10 +22,10 @@ def limit_rejects(
 ) -> Bits:
     """Limits of engine, machine and shafts, whatever the architecture may do."""
     tolerance = _TORQUE_TOLERANCE_NM
-    engine, machine = architecture.engine, architecture.machine
+    engine, machine = architecture.engine, architecture.machines[0]
     engine_speed, speed = joint.engine_speed_radps[:, None], joint.machine_speed_radps[:, None]
-    full = engine_model.full_load_torque_nm(engine, engine_speed) if joint.engine_on else 0.0
-    limit = machine_model.torque_limit_nm(machine, speed)
+    full = engine.full_load_nm(engine_speed) if joint.engine_on else 0.0
+    limit = machine.limit_nm(speed)
     torque = np.abs(torques.machine)
     wanted = demand.wheel_torque_nm[:, None]
     unmet = np.where(wanted > 0, np.abs(torques.brake), -torques.brake) > 10 * tolerance
@@ -71,7 +69,7 @@ def function_rejects(
         banned |= motoring & (torques.engine <= 0)
         if not has("nox_cut"):
             speed = joint.engine_speed_radps[:, None]
-            full = engine_model.covered_torque_nm(architecture.engine, speed)
+            full = architecture.engine.covered_nm(speed)
             banned |= motoring & ~(has("e_boost") & (torques.engine > full - _BOOST_SLACK_NM))
     if not has("regenerative_braking"):
         banned |= (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)

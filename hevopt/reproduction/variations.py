@@ -151,7 +151,7 @@ def _driveline(car: Architecture) -> dict[str, float]:
 def _alternator_as_belt(car: Architecture) -> dict[str, float]:
     if car.coupling.kind != "none":
         return {}
-    return {"machine.efficiency": load_architecture("B").machine.efficiency}
+    return {"machine.efficiency": load_architecture("B").machines[0].loss.efficiency}
 
 
 def _road(car: Architecture) -> dict[str, float]:

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from hevopt import load_architecture
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
-from hevopt.car.engine import EngineGrid
+from hevopt.car.engine_laws import EngineMap
 from hevopt.car.transmission import input_torque_nm, output_torque_nm
 from hevopt.car.vehicle import tractive_force_n
 from hevopt.car_files.car import CarFile
@@ -58,15 +56,15 @@ def car():
 
 
 def test_idle_burns_0_4_litres_per_hour(car):
-    kgps = engine_model.fuel_kgps(car.engine, np.array(0.0), np.array(850 * RPM))
+    kgps = car.engine.fuel_kgps(np.array(0.0), np.array(850 * RPM))
     assert kgps * 3600 / 0.835 == pytest.approx(0.40, abs=0.005)
 
 
 def test_peak_efficiency_is_40_5_percent_near_2375_rpm_and_190_nm(car):
     speed, torque = np.meshgrid(np.arange(850, 4500, 25) * RPM, np.arange(5, 290, 5.0))
-    fuel = engine_model.fuel_kgps(car.engine, torque, speed)
+    fuel = car.engine.fuel_kgps(torque, speed)
     efficiency = torque * speed / (fuel * 42.9e6)
-    efficiency[torque > engine_model.full_load_torque_nm(car.engine, speed)] = 0
+    efficiency[torque > car.engine.full_load_nm(speed)] = 0
     best = np.unravel_index(efficiency.argmax(), efficiency.shape)
     assert efficiency.max() == pytest.approx(0.405, abs=0.002)
     assert speed[best] / RPM == pytest.approx(2375, abs=150)
@@ -75,15 +73,15 @@ def test_peak_efficiency_is_40_5_percent_near_2375_rpm_and_190_nm(car):
 
 def test_drag_is_22_nm_at_2000_rpm_and_there_the_fuel_is_cut(car):
     speed = np.array(2000 * RPM)
-    drag = engine_model.drag_torque_nm(car.engine, speed)
+    drag = car.engine.drag_nm(speed)
     assert drag == pytest.approx(-22.5, abs=0.6)
-    assert engine_model.fuel_kgps(car.engine, drag, speed) == 0
-    assert engine_model.fuel_kgps(car.engine, drag + 1, speed) > 0
+    assert car.engine.fuel_kgps(drag, speed) == 0
+    assert car.engine.fuel_kgps(drag + 1, speed) > 0
 
 
 def test_fuel_mean_pressure_solves_its_equation(car):
     torque, speed = 100.0, 2000 * RPM
-    power = engine_model.fuel_kgps(car.engine, np.array(torque), np.array(speed)) * 42.9e6
+    power = car.engine.fuel_kgps(np.array(torque), np.array(speed)) * 42.9e6
     p_mf = power / (1598e-6 * speed / (4 * pi)) / 1e5
     p_me, cm = 4 * pi * torque / 1598e-6 / 1e5, 2 * 0.0805 * 2000 / 60
     slope = 0.39902 + 0.031510 * cm - 0.0022991 * cm**2
@@ -93,7 +91,7 @@ def test_fuel_mean_pressure_solves_its_equation(car):
 def test_nox_at_2000_rpm_and_10_bar_by_hand(car):
     # BS = 1.216 + 2.722 / (1 + exp(-(10 - 8.498) / 1.471)) = 3.2172 g/kWh; 10 bar x 1.598 l x 16.667/s = 26.63 kW
     torque = 10e5 * 1598e-6 / (4 * pi)
-    nox = engine_model.nox_kgps(car.engine, np.array(torque), np.array(2000 * RPM))
+    nox = car.engine.nox_kgps(np.array(torque), np.array(2000 * RPM))
     constant = 0.02e-6 * 1.598 * 2000 / 120
     assert nox - constant == pytest.approx(3.2172 * 26.633 / 3600 * 1e-3, rel=1e-4)
 
@@ -102,31 +100,31 @@ def test_a_measured_grid_is_exact_at_its_points_and_never_extrapolated(car):
     speeds, torques = np.array([100.0, 200.0, 300.0]), np.array([0.0, 50.0, 100.0])
     fuel = np.outer(speeds, 10 + torques) * 1e-8
     fuel[2, 2] = np.nan
-    grid = EngineGrid(speeds, torques, fuel, fuel / 100, np.array([-20.0, -22.0, -25.0]))
+    grid = EngineMap(speeds, torques, fuel, fuel / 100, np.array([-20.0, -22.0, -25.0]))
     from dataclasses import replace
 
-    engine = replace(car.engine, fuel=grid)
-    assert engine_model.fuel_kgps(engine, np.array(50.0), np.array(200.0)) == fuel[1, 1]
-    middle = engine_model.fuel_kgps(engine, np.array(25.0), np.array(150.0))
+    engine = replace(car.engine, law=grid)
+    assert engine.fuel_kgps(np.array(50.0), np.array(200.0)) == fuel[1, 1]
+    middle = engine.fuel_kgps(np.array(25.0), np.array(150.0))
     assert middle == pytest.approx(fuel[:2, :2].mean())
     outside = [(101.0, 150.0), (50.0, 99.0), (50.0, 301.0), (-5.0, 150.0), (90.0, 250.0)]
     for torque, speed in outside:
-        assert np.isnan(engine_model.fuel_kgps(engine, np.array(torque), np.array(speed)))
-    assert engine_model.fuel_kgps(engine, np.array(-22.0), np.array(200.0)) == 0
+        assert np.isnan(engine.fuel_kgps(np.array(torque), np.array(speed)))
+    assert engine.fuel_kgps(np.array(-22.0), np.array(200.0)) == 0
 
 
 def test_machine_loss_and_its_inverse(car):
     torque, speed = np.array(-30.0), np.array(200.0)
     loss = 54.7 + 0.296 * 200 + 0.00204 * 200**2 + 0.194 * 30**2
-    assert machine_model.loss_w(car.machine, torque, speed) == pytest.approx(loss)
+    assert car.machines[0].loss_w(torque, speed) == pytest.approx(loss)
     electric = 30 * 200 - loss
-    back = machine_model.generating_torque_nm(car.machine, electric, speed)
+    back = car.machines[0].generating_nm(electric, speed)
     assert back == pytest.approx(-30.0)
-    assert machine_model.loss_w(car.machine, np.array(0.0), np.array(0.0)) == 0
+    assert car.machines[0].loss_w(np.array(0.0), np.array(0.0)) == 0
 
 
 def test_torque_limit_follows_power_above_base_speed(car):
-    limits = machine_model.torque_limit_nm(car.machine, np.array([0.0, 150.0, 300.0]))
+    limits = car.machines[0].limit_nm(np.array([0.0, 150.0, 300.0]))
     assert limits == pytest.approx([120, 120, 60])
 
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from hevopt import InfeasibleError, build_problem, load_architecture
-from hevopt.car import engine as engine_model
-from hevopt.car.engine import EngineGrid
-from hevopt.car.machine import LossGrid
+from hevopt.car.engine_laws import EngineMap
+from hevopt.car.machine_laws import LossMap
 from hevopt.driving.cycle import Cycle
 from hevopt.pages.comparison.maps import engine_map
 from hevopt.problem.table import Reject
@@ -22,10 +21,10 @@ def sampled(car, low_rpm: float, high_rpm: float, *, nox_to_nm: float = np.inf):
     """The car with its engine's formula as a map of some speeds, NOx known up to a torque."""
     speed = np.arange(low_rpm, high_rpm + 1, 50.0) * RPM
     mesh = np.meshgrid(speed, TORQUE, indexing="ij")[::-1]
-    nox = np.where(mesh[0] <= nox_to_nm, engine_model.nox_kgps(car.engine, *mesh), np.nan)
-    drag = engine_model.drag_torque_nm(car.engine, speed)
-    grid = EngineGrid(speed, TORQUE, engine_model.fuel_kgps(car.engine, *mesh), nox, drag)
-    return replace(car, engine=replace(car.engine, fuel=grid, nox=None))
+    nox = np.where(mesh[0] <= nox_to_nm, car.engine.nox_kgps(*mesh), np.nan)
+    drag = car.engine.drag_nm(speed)
+    grid = EngineMap(speed, TORQUE, car.engine.fuel_kgps(*mesh), nox, drag)
+    return replace(car, engine=replace(car.engine, law=grid))
 
 
 def braking(car, rpm: float, gear: int = 2) -> Cycle:
@@ -65,12 +64,12 @@ def test_an_engine_is_not_dragged_beyond_the_speeds_of_its_map(name):
 def test_drag_and_fuel_cut_are_unknown_beyond_the_map(rpm):
     car = sampled(load_architecture("A"), 1200, 2500)
     at = np.array(rpm * RPM)
-    assert np.isnan(engine_model.drag_torque_nm(car.engine, at))
+    assert np.isnan(car.engine.drag_nm(at))
     for torque in (-500.0, -30.0, 0.0, 50.0):
-        assert np.isnan(engine_model.fuel_kgps(car.engine, np.array(torque), at))
+        assert np.isnan(car.engine.fuel_kgps(np.array(torque), at))
     ends = np.array([1200, 1200 * (1 - 1e-13), 2500, 2500 * (1 + 1e-13)]) * RPM
-    by_formula = engine_model.drag_torque_nm(load_architecture("A").engine, ends)
-    assert engine_model.drag_torque_nm(car.engine, ends) == pytest.approx(by_formula)
+    by_formula = load_architecture("A").engine.drag_nm(ends)
+    assert car.engine.drag_nm(ends) == pytest.approx(by_formula)
 
 
 def test_an_engine_whose_map_begins_above_idle_neither_idles_nor_is_dragged_there():
@@ -93,10 +92,10 @@ def test_the_best_torque_is_one_that_the_map_knows():
     car = sampled(load_architecture("A"), 1200, 2500)
     whole = load_architecture("A").engine
     inside = np.linspace(1300, 2400, 12) * RPM
-    found = engine_model.best_torque_nm(car.engine, inside)
-    assert found == pytest.approx(engine_model.best_torque_nm(whole, inside), rel=0.1)
+    found = car.engine.best_nm(inside)
+    assert found == pytest.approx(whole.best_nm(inside), rel=0.1)
     # Just inside the map's ends too, where the next speed looked at lies outside.
-    ends = engine_model.best_torque_nm(car.engine, np.array([1201, 2499]) * RPM)
+    ends = car.engine.best_nm(np.array([1201, 2499]) * RPM)
     assert ends == pytest.approx(found[[0, -1]], rel=0.2)
 
 
@@ -112,8 +111,8 @@ def test_the_page_draws_no_drag_beyond_the_map():
 def test_an_alternator_outside_its_map_is_said_in_numbers(allow):
     car = load_architecture("A")
     axis = np.linspace(0, 300, 4), np.linspace(-40, 40, 5)
-    loss = LossGrid(*axis, np.full((4, 5), 50.0))
-    car = replace(car, machine=replace(car.machine, loss=loss, efficiency=None))
+    loss = LossMap(*axis, np.full((4, 5), 50.0))
+    car = replace(car, machines=(replace(car.machines[0], loss=loss),))
     with pytest.raises(InfeasibleError) as found:
         build_problem(car, braking(car, 4500), allow_shortfall=allow)
     assert "outside the machine map" in str(found.value) and "nan" not in str(found.value)

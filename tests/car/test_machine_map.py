@@ -8,9 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hevopt import DataError, build_problem, load_architecture, load_cycle, simulate, solve
-from hevopt.car import machine as machine_model
 from hevopt.car.grid import highest_known, interpolated
-from hevopt.car.machine import LossGrid
+from hevopt.car.machine_laws import LossMap
 from hevopt.files.lookup import shipped_folder
 from hevopt.problem.table import Reject
 
@@ -21,15 +20,15 @@ TORQUE = np.linspace(-120, 120, 49)
 
 @pytest.fixture(scope="module")
 def formula():
-    return load_architecture("C2").machine
+    return load_architecture("C2").machines[0]
 
 
 def sampled(machine, *, beyond_w: float = 30e3):
     """The machine with its loss as a map, cells beyond a power not measured."""
     speed, torque = np.meshgrid(SPEED, TORQUE, indexing="ij")
-    loss = machine_model.loss_w(machine, torque, speed)
+    loss = machine.loss_w(torque, speed)
     loss[np.abs(speed * torque) > beyond_w] = np.nan
-    return replace(machine, loss=LossGrid(SPEED, TORQUE, loss))
+    return replace(machine, loss=LossMap(SPEED, TORQUE, loss))
 
 
 def test_a_cell_with_three_corners_is_used_on_their_triangle_alone():
@@ -71,39 +70,39 @@ def test_the_map_is_the_formula_at_its_points_and_close_between_them(formula):
     machine = sampled(formula)
     speed, torque = np.meshgrid(SPEED[1:], TORQUE, indexing="ij")
     known = np.abs(speed * torque) <= 30e3
-    at_points = machine_model.loss_w(machine, torque, speed)
-    assert_allclose(at_points[known], machine_model.loss_w(formula, torque, speed)[known])
+    at_points = machine.loss_w(torque, speed)
+    assert_allclose(at_points[known], formula.loss_w(torque, speed)[known])
     rng = np.random.default_rng(2)
     speed, torque = rng.uniform(25, 650, 2000), rng.uniform(-120, 120, 2000)
     inside = np.abs(speed * torque) < 25e3
-    between = machine_model.loss_w(machine, torque, speed)[inside]
+    between = machine.loss_w(torque, speed)[inside]
     # Linear between torques 5 Nm apart: c3 (2.5 Nm)² above the parabola, and less for the speed.
-    off = between - machine_model.loss_w(formula, torque, speed)[inside]
+    off = between - formula.loss_w(torque, speed)[inside]
     assert off.min() > -1e-9 and off.max() < 0.194 * 2.5**2 + 0.00204 * 12.5**2
 
 
 def test_nothing_is_known_outside_the_map(formula):
     machine = sampled(formula)
     for torque, speed in [(121.0, 100.0), (-121.0, 100.0), (10.0, 651.0), (110.0, 600.0)]:
-        assert np.isnan(machine_model.loss_w(machine, np.array(torque), np.array(speed)))
-    assert machine_model.loss_w(machine, np.array(0.0), np.array(0.0)) == 0
+        assert np.isnan(machine.loss_w(np.array(torque), np.array(speed)))
+    assert machine.loss_w(np.array(0.0), np.array(0.0)) == 0
 
 
 @pytest.mark.parametrize("power_w", [0.0, 250.0, 4000.0])
 def test_the_generating_torque_gives_the_power_exactly(formula, power_w):
     machine = sampled(formula)
     speed = np.random.default_rng(3).uniform(0, 650, 500)
-    torque = machine_model.generating_torque_nm(machine, power_w, speed)
+    torque = machine.generating_nm(power_w, speed)
     known = ~np.isnan(torque)
     assert known.sum() > 300 and (torque[known] <= 0).all()
-    electric = torque * speed + machine_model.loss_w(machine, torque, speed)
+    electric = torque * speed + machine.loss_w(torque, speed)
     assert_allclose(electric[known], -power_w, atol=1e-8)
-    by_formula = machine_model.generating_torque_nm(formula, power_w, speed)
+    by_formula = formula.generating_nm(power_w, speed)
     assert_allclose(torque[known & (speed > 80)], by_formula[known & (speed > 80)], atol=0.5)
     # Where the map has no answer, neither it nor any torque of it generates that much.
     for s in speed[~known]:
         tried = np.linspace(-120, 0, 2001)
-        loss = machine_model.loss_w(machine, tried, np.full_like(tried, s))
+        loss = machine.loss_w(tried, np.full_like(tried, s))
         assert not (tried * s + loss < -power_w - 1).any()
 
 
@@ -126,10 +125,10 @@ def test_a_symmetric_map_loses_the_same_at_the_opposite_torque(tmp_path):
         "[loss_map]\nsymmetric = true\nspeed_rpm = [0, 6000]\ntorque_nm = [0, 120]\n"
         "loss_w = [[50, 900], [200, nan]]\n"
     )
-    machine = load_architecture(machine_file(tmp_path, loss)).machine
+    machine = load_architecture(machine_file(tmp_path, loss)).machines[0]
     assert_allclose(machine.loss.torque_nm, [-120, 0, 120])
     torque, speed = np.array([60.0, -60.0, 120.0, -120.0]), np.full(4, 1e-9)
-    assert_allclose(machine_model.loss_w(machine, torque, speed), [475, 475, 900, 900])
+    assert_allclose(machine.loss_w(torque, speed), [475, 475, 900, 900])
 
 
 @pytest.mark.parametrize(
@@ -155,14 +154,14 @@ def test_a_wrong_loss_map_is_one_clear_message(tmp_path, loss_map, said):
 
 def test_a_car_is_kept_inside_its_machine_map(formula):
     car = load_architecture("C2")
-    small = replace(car, machine=sampled(formula, beyond_w=6e3))
+    small = replace(car, machines=(sampled(formula, beyond_w=6e3),))
     problem = build_problem(small, load_cycle("nedc"))
     rejected = problem.table.reject & Reject.MACHINE_MAP > 0
     speed = problem.table.flows["machine_speed_radps"]
     torque = problem.table.flows["machine_torque_nm"]
     assert rejected.any() and np.isfinite(problem.table.battery_power_w).all()
     turning = (speed > 0) | (torque != 0)
-    loss = machine_model.loss_w(small.machine, torque, speed)
+    loss = small.machines[0].loss_w(torque, speed)
     assert (rejected == (turning & np.isnan(loss))).all()
     driven = simulate(problem, solve(problem, "dp").control)
     assert (
@@ -174,6 +173,6 @@ def test_optimum_on_a_map_is_that_of_the_formula_it_was_sampled_from(formula):
     car, cycle = load_architecture("C2"), load_cycle("nedc")
     fuel = []
     for machine in (formula, sampled(formula)):
-        problem = build_problem(replace(car, machine=machine), cycle)
+        problem = build_problem(replace(car, machines=(machine,)), cycle)
         fuel.append(simulate(problem, solve(problem, "dp").control).total_fuel_kg)
     assert fuel[1] == pytest.approx(fuel[0], rel=5e-3)

@@ -60,7 +60,7 @@ def test_a_copy_of_a_copy_elsewhere_holds_the_same_values_and_its_comments_once(
     assert but_name(one.contents) == but_name(two.contents)
     assert one.files[1:2] == (tmp_path / "components" / "one_battery.toml",)
     assert two.files[1].samefile(one.files[1])
-    assert two.engine.displacement_m3 == pytest.approx(1.25 * 1598e-6)
+    assert two.engine.law.displacement_m3 == pytest.approx(1.25 * 1598e-6)
     again = second.read_text()
     assert again.count("Millo, Rolando, Andreata 2011, section 4.2") == 1
     assert again.count("[E] mine") == 1 and again.count("an architecture for hevopt") == 1

@@ -184,7 +184,7 @@ def test_a_variation_that_changes_nothing_in_a_car_is_no_variation_of_it():
 
 def test_loss_of_an_efficiency_grows_with_its_factor():
     changed, _, _, _ = varied("B", load_cycle(CYCLE), v.MACHINE_LOSS)
-    assert changed.machine.efficiency == pytest.approx(0.625)  # 1 - 1.5 (1 - 0.75)
+    assert changed.machines[0].loss.efficiency == pytest.approx(0.625)  # 1 - 1.5 (1 - 0.75)
     less, _, _, _ = varied("B", load_cycle(CYCLE), v.LESS_CHARGING_LOSS)
     assert less.battery.coulombic_efficiency == pytest.approx(0.925)  # 1 - 0.5 (1 - 0.85)
 

@@ -20,7 +20,7 @@ def test_a_changed_key_reaches_the_car_and_nothing_else():
     car = load_architecture(
         "C2", {"machine.power_max_w": 2e4, "hybrid_mass_kg": 80, "gearbox.ratios.0": 4.2}
     )
-    assert car.machine == replace(plain.machine, power_max_w=2e4)
+    assert car.machines[0] == replace(plain.machines[0], power_max_w=2e4)
     assert car.vehicle.mass_kg == plain.vehicle.mass_kg + 10
     assert car.gearbox.ratios[1] == pytest.approx(4.2 * 3.4)
     assert load_architecture("C2").contents == plain.contents
@@ -43,7 +43,9 @@ coupling = { kind = "crankshaft" }
     assert car.engine.start_fuel_kg == pytest.approx(5e-4)
     assert car.engine.fuel_density_kgpm3 == pytest.approx(800)
     assert car.engine.heating_value_jpkg == pytest.approx(42.9e6)
-    assert load_architecture("C2", {"engine": "engine_diesel_1600_steep_nox"}).engine.nox.lo == 0.5
+    assert (
+        load_architecture("C2", {"engine": "engine_diesel_1600_steep_nox"}).engine.law.nox.lo == 0.5
+    )
 
 
 @pytest.mark.parametrize(

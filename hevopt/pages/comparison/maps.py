@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
 from hevopt.car.architecture import Architecture
 from hevopt.pages.comparison.results import MapFigures
 
@@ -23,8 +21,8 @@ def engine_map(car: Architecture) -> MapFigures:
     grid_speed, grid_torque = speed[:, None], torque[None, :]
     work = grid_speed * grid_torque
     with np.errstate(invalid="ignore", divide="ignore"):
-        fuel = engine_model.fuel_kgps(engine, grid_torque, grid_speed)
-        nox = engine_model.nox_kgps(engine, grid_torque, grid_speed) / work
+        fuel = engine.fuel_kgps(grid_torque, grid_speed)
+        nox = engine.nox_kgps(grid_torque, grid_speed) / work
         efficiency = work / (fuel * engine.heating_value_jpkg)
     return MapFigures(
         name=engine.name,
@@ -32,8 +30,8 @@ def engine_map(car: Architecture) -> MapFigures:
         torque_nm=_rounded(torque, 3),
         efficiency=_nested(efficiency, 5),
         nox_kgpj=_nested(nox, 14) if np.nanmax(nox) > 0 else None,
-        limit_nm=_rounded(engine_model.full_load_torque_nm(engine, speed), 3),
-        least_nm=_nested(engine_model.drag_torque_nm(engine, speed)[None, :], 3)[0],
+        limit_nm=_rounded(engine.full_load_nm(speed), 3),
+        least_nm=_nested(engine.drag_nm(speed)[None, :], 3)[0],
     )
 
 
@@ -42,10 +40,10 @@ def machine_map(car: Architecture, used_radps: float, used_nm: float) -> MapFigu
 
     used_radps, used_nm: highest speed and torque that can be used, for a machine that names no limits
     """
-    machine = car.machine
+    machine = car.machines[0]
     top_speed = machine.speed_max_radps if np.isfinite(machine.speed_max_radps) else used_radps
     speed = np.linspace(0.0, max(float(top_speed), 1.0), _SPEEDS)
-    limit = machine_model.torque_limit_nm(machine, speed)
+    limit = machine.limit_nm(speed)
     top = machine.torque_max_nm if np.isfinite(machine.torque_max_nm) else 1.1 * used_nm
     top = max(float(top), 1e-3)
     # A limit beyond the grid is none that could be drawn.
@@ -53,7 +51,7 @@ def machine_map(car: Architecture, used_radps: float, used_nm: float) -> MapFigu
     torque = np.linspace(-top, top, 2 * (_TORQUES // 2) + 1)
     grid_speed, grid_torque = speed[:, None], torque[None, :]
     mechanical = grid_speed * grid_torque
-    electric = mechanical + machine_model.loss_w(machine, grid_torque, grid_speed)
+    electric = mechanical + machine.loss_w(grid_torque, grid_speed)
     with np.errstate(invalid="ignore", divide="ignore"):
         efficiency = np.where(mechanical > 0, mechanical / electric, electric / mechanical)
     # A generator that needs power from both sides has no efficiency.

@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
-from hevopt.car.engine import EngineGrid, full_load_torque_nm
-from hevopt.car.machine import torque_limit_nm
 from hevopt.pages.comparison.results import Share
 from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.table import ControlTable
@@ -88,7 +86,7 @@ def limits_touched(car: Architecture, problem: Problem, trajectory: Trajectory) 
     torque, speed = f["engine_torque_nm"], f["engine_speed_radps"]
     fired = f["fuel_power_w"] > 0
     machine_torque, machine_speed = f["machine_torque_nm"], f["machine_speed_radps"]
-    limit = torque_limit_nm(car.machine, machine_speed)
+    limit = car.machines[0].limit_nm(machine_speed)
     current = f["battery_current_a"]
     width = _WINDOW_NEAR * (pack.soc_max - pack.soc_min)
     low, high = (
@@ -96,27 +94,16 @@ def limits_touched(car: Architecture, problem: Problem, trajectory: Trajectory) 
         trajectory.soc[1:] >= pack.soc_max - width,
     )
     near = {
-        "engine full load": fired & (torque >= (1 - _NEAR) * full_load_torque_nm(car.engine, speed)),
+        "engine full load": fired & (torque >= (1 - _NEAR) * car.engine.full_load_nm(speed)),
         "engine top speed": speed >= (1 - _NEAR) * car.engine.speed_max_radps,
-        "edge of the engine map": fired & _near_grid_edge(car, torque, speed),
+        "edge of the engine map": fired & car.engine.law.near_edge(torque, speed, _NEAR),
         "machine torque or power": (np.abs(machine_torque) >= (1 - _NEAR) * limit)
         & (np.abs(machine_torque) > 0),
-        "machine top speed": machine_speed >= (1 - _NEAR) * car.machine.speed_max_radps,
+        "machine top speed": machine_speed >= (1 - _NEAR) * car.machines[0].speed_max_radps,
         "battery power": _near_battery_limit(problem, trajectory.battery_power_w, current),
         "SOC window": low | high,
     }  # fmt: skip
     return {name: int(np.sum(steps)) for name, steps in near.items() if steps.any()}
-
-
-def _near_grid_edge(car: Architecture, torque: Array, speed: Array) -> NDArray[np.bool_]:
-    grid = car.engine.fuel
-    if not isinstance(grid, EngineGrid):
-        return np.zeros(len(torque), dtype=bool)
-    near = np.zeros(len(torque), dtype=bool)
-    for value, axis in ((torque, grid.torque_nm), (speed, grid.speed_radps)):
-        margin = _NEAR * (axis[-1] - axis[0])
-        near |= (value <= axis[0] + margin) | (value >= axis[-1] - margin)
-    return near
 
 
 def _near_battery_limit(problem: Problem, power: Array, current: Array) -> NDArray[np.bool_]:

@@ -8,13 +8,12 @@ from map_bench import ENGINE, FUEL, LIKE, RPM, SPEEDS, bench, car_with, componen
 from numpy.testing import assert_allclose
 
 from hevopt import load_architecture
-from hevopt.car import engine as engine_model
 
 IMPORT = ("maps", "import", "b.csv", "--kind", "engine", *LIKE)
 CURVES = ("--full-load", "curves.csv", "--motoring", "curves.csv")
 SPEED = np.array(SPEEDS) * RPM
-FULL = engine_model.full_load_torque_nm(ENGINE, SPEED)
-DRAG = engine_model.drag_torque_nm(ENGINE, SPEED)
+FULL = ENGINE.full_load_nm(SPEED)
+DRAG = ENGINE.drag_nm(SPEED)
 
 
 def write_curves(share: float = 1.0, more_nm: float = 0.0) -> None:
@@ -47,12 +46,12 @@ def test_nox_is_unknown_where_its_table_does_not_reach_and_right_where_it_does(h
     assert lost == pytest.approx(100 * (1 - rest / area), abs=1)
     engine = imported_engine()
     speed, share = np.meshgrid(np.linspace(850, 5000, 167) * RPM, np.linspace(0, 1, 40))
-    load = share * engine_model.full_load_torque_nm(engine, speed)
-    found = engine_model.nox_kgps(engine, load, speed)
+    load = share * engine.full_load_nm(speed)
+    found = engine.nox_kgps(load, speed)
     inside = (speed >= 1000 * RPM) & (speed <= 4500 * RPM)
     assert np.isnan(found[~inside]).all() and not np.isnan(found[inside]).any()
-    assert not np.isnan(engine_model.fuel_kgps(engine, load, speed)).any()
-    truth = engine_model.nox_kgps(ENGINE, load, speed)
+    assert not np.isnan(engine.fuel_kgps(load, speed)).any()
+    truth = ENGINE.nox_kgps(load, speed)
     assert_allclose(found[inside], truth[inside], rtol=0, atol=0.03 * truth.max())
 
 
@@ -63,8 +62,8 @@ def test_a_full_load_curve_a_hair_above_the_points_is_reached(hevopt):
     assert "full load: up to 0.039 Nm (0.01%, at 1500 rpm) above the highest measured" in seen.out
     engine = imported_engine()
     speed = np.linspace(850, 5000, 800) * RPM
-    truth = engine_model.full_load_torque_nm(ENGINE, speed)
-    assert_allclose(engine_model.covered_torque_nm(engine, speed), truth, rtol=2e-6)
+    truth = ENGINE.full_load_nm(speed)
+    assert_allclose(engine.covered_nm(speed), truth, rtol=2e-6)
     assert (np.array(component("b.toml")["full_load"]["torque_nm"]) <= FULL.max() + 1e-3).all()
 
 
@@ -75,8 +74,8 @@ def test_a_full_load_curve_well_above_the_points_is_no_reason_to_go_beyond_them(
     assert "full load: up to 2.9 Nm" in seen.out and "the map ends below the curve at" in seen.out
     engine = imported_engine()
     speed = np.linspace(850, 5000, 800) * RPM
-    truth = engine_model.full_load_torque_nm(ENGINE, speed)
-    covered = engine_model.covered_torque_nm(engine, speed)
+    truth = ENGINE.full_load_nm(speed)
+    covered = engine.covered_nm(speed)
     assert (covered <= truth * (1 + 1e-6)).all()
     assert_allclose(covered[speed < 2700 * RPM], truth[speed < 2700 * RPM], rtol=1e-4)
 
@@ -104,7 +103,7 @@ def test_drag_above_0_is_turned_also_with_a_standstill_and_mixed_signs_are_named
     write("drag.csv", "n [rpm],drag [Nm]", [0, *SPEEDS], np.abs([0, *DRAG]))
     seen = hevopt(*IMPORT, "--motoring", "drag.csv")
     assert seen.status == 0 and "given as drag, sign turned" in seen.out, seen
-    assert_allclose(engine_model.drag_torque_nm(imported_engine(), SPEED), DRAG, rtol=1e-6)
+    assert_allclose(imported_engine().drag_nm(SPEED), DRAG, rtol=1e-6)
     mixed = np.where(np.arange(len(SPEEDS)) == 4, 1, -1) * DRAG
     write("drag.csv", "n [rpm],drag [Nm]", SPEEDS, mixed)
     seen = hevopt(*IMPORT, "--motoring", "drag.csv")
@@ -184,13 +183,13 @@ def test_the_plot_colours_what_a_car_can_use_and_nothing_else(hevopt):
     left, right, top, bottom = columns[0], columns[-1], rows[0], rows[-1]
     green = np.abs(picture - picture[bottom - 60, right - 60]).max(axis=2) < 0.02
     column, row = (np.arange(a, b) for a, b in ((left + 2, right), (top + 2, bottom)))
-    low, high = engine.fuel.torque_nm[0], 290.0
+    low, high = engine.law.torque_nm[0], 290.0
     speed = 850 + 4150 * ((column + 0.5 - left) / (right + 1 - left) * 1.1 - 0.05)
     load = low + (high - low) * ((bottom + 0.5 - row) / (bottom + 1 - top) * 1.1 - 0.05)
     speed, load = np.meshgrid(speed * RPM, load)
-    flow = engine_model.fuel_kgps(engine, load, speed) + engine_model.nox_kgps(engine, load, speed)
-    usable = ~np.isnan(flow) & (load <= engine_model.full_load_torque_nm(engine, speed))
-    usable &= (load >= engine_model.drag_torque_nm(engine, speed)) & (speed <= SPEED[-1])
+    flow = engine.fuel_kgps(load, speed) + engine.nox_kgps(load, speed)
+    usable = ~np.isnan(flow) & (load <= engine.full_load_nm(speed))
+    usable &= (load >= engine.drag_nm(speed)) & (speed <= SPEED[-1])
     shown = green[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
     # Points, lines and hatches are drawn over the colour, and edges fall within pixels.
     assert (shown & ~usable).mean() < 0.005 and (usable & ~shown).mean() < 0.1

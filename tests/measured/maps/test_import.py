@@ -25,8 +25,6 @@ from map_bench import (
 from numpy.testing import assert_allclose
 
 from hevopt import compare, load_architecture
-from hevopt.car import engine as engine_model
-from hevopt.car import machine as machine_model
 
 
 def test_nedc_fuel_of_a_measured_engine_is_that_of_its_coefficients(hevopt):
@@ -53,9 +51,9 @@ def test_nedc_fuel_of_a_measured_engine_is_that_of_its_coefficients(hevopt):
     assert Path("bench.png").read_bytes().startswith(b"\x89PNG")
     measured = load_architecture(car_with("engine", "bench.toml", "A")).engine
     speed = np.linspace(measured.full_load_speed_radps[0], measured.speed_max_radps, 500)
-    full = engine_model.full_load_torque_nm(measured, speed)
-    at_full_load = engine_model.fuel_kgps(measured, full, speed)
-    assert_allclose(at_full_load, engine_model.fuel_kgps(ENGINE, full, speed), rtol=0.03)
+    full = measured.full_load_nm(speed)
+    at_full_load = measured.fuel_kgps(full, speed)
+    assert_allclose(at_full_load, ENGINE.fuel_kgps(full, speed), rtol=0.03)
     for name, strategy in (("A", "baseline"), ("C2", "dp")):
         ours = car_with("engine", "bench.toml", name)
         rows = compare("nedc", [name, ours], [strategy]).rows
@@ -216,10 +214,7 @@ def test_a_workbook_has_a_sheet_for_each_map_and_curve(hevopt):
         curves.append(
             [
                 rpm,
-                *(
-                    float(f(ENGINE, w))
-                    for f in (engine_model.full_load_torque_nm, engine_model.drag_torque_nm)
-                ),
+                *(float(f(w)) for f in (ENGINE.full_load_nm, ENGINE.drag_nm)),
             ]
         )
     book.save("m.xlsx")
@@ -229,12 +224,8 @@ def test_a_workbook_has_a_sheet_for_each_map_and_curve(hevopt):
     assert seen.status == 0, seen
     found = component("m.toml")
     w = np.array(SPEEDS) * RPM
-    assert_allclose(
-        found["full_load"]["torque_nm"], engine_model.full_load_torque_nm(ENGINE, w), rtol=1e-6
-    )
-    assert_allclose(
-        found["fuel_map"]["motoring_torque_nm"], engine_model.drag_torque_nm(ENGINE, w), rtol=1e-6
-    )
+    assert_allclose(found["full_load"]["torque_nm"], ENGINE.full_load_nm(w), rtol=1e-6)
+    assert_allclose(found["fuel_map"]["motoring_torque_nm"], ENGINE.drag_nm(w), rtol=1e-6)
     first = found["fuel_map"]["torque_nm"].index(TORQUES[1])
     written = np.array(found["fuel_map"]["nox_gps"])[:, first:] * 3600
     assert_allclose(written[~np.isnan(nox)], nox[~np.isnan(nox)], rtol=1e-6)
@@ -248,7 +239,7 @@ def test_units_by_option_do_not_outdo_the_header_of_another_file(hevopt):
         "full.csv",
         "omega [rad/s],T [kNm]",
         speeds,
-        engine_model.full_load_torque_nm(ENGINE, speeds) / 1e3,
+        ENGINE.full_load_nm(speeds) / 1e3,
     )
     units = ("--unit", "speed=rpm", "--unit", "torque=Nm", "--unit", "fuel=g/h")
     seen = hevopt(
@@ -257,7 +248,7 @@ def test_units_by_option_do_not_outdo_the_header_of_another_file(hevopt):
     assert seen.status == 0, seen
     found = component("b.toml")["full_load"]
     assert_allclose(found["speed_rpm"], SPEEDS)
-    assert_allclose(found["torque_nm"], engine_model.full_load_torque_nm(ENGINE, speeds), rtol=1e-6)
+    assert_allclose(found["torque_nm"], ENGINE.full_load_nm(speeds), rtol=1e-6)
 
 
 def test_what_a_row_cannot_say_is_left_out_and_listed(hevopt):
@@ -317,7 +308,7 @@ def test_nothing_is_continued_below_a_full_load_curve_that_no_point_reaches(hevo
     rpm, torque, fuel, _ = bench(TORQUES, False).T
     low = torque <= 100
     write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm[low], torque[low], fuel[low])
-    rows = [(r, engine_model.full_load_torque_nm(ENGINE, np.array(r * RPM)) + 1) for r in SPEEDS]
+    rows = [(r, ENGINE.full_load_nm(np.array(r * RPM)) + 1) for r in SPEEDS]
     write("full.csv", "n [rpm],T [Nm]", *np.array(rows).T)
     assert (
         hevopt(
@@ -329,16 +320,14 @@ def test_nothing_is_continued_below_a_full_load_curve_that_no_point_reaches(hevo
     speed, load = np.meshgrid(
         np.linspace(850, 5000, 200) * RPM, np.linspace(100.1, 290, 100), indexing="ij"
     )
-    assert np.isnan(engine_model.fuel_kgps(engine, load, speed)).all()
+    assert np.isnan(engine.fuel_kgps(load, speed)).all()
 
 
 def test_what_the_car_asks_for_outside_the_map_is_rejected_and_said(hevopt):
     rpm, torque, fuel, _ = bench(TORQUES, False).T
     low = torque <= 30
     write("b.csv", "n [rpm],T [Nm],fuel [g/h]", rpm[low], torque[low], fuel[low])
-    rows = np.array(
-        [(r, engine_model.full_load_torque_nm(ENGINE, np.array(r * RPM))) for r in SPEEDS]
-    ).T
+    rows = np.array([(r, ENGINE.full_load_nm(np.array(r * RPM))) for r in SPEEDS]).T
     write("full.csv", "n [rpm],T [Nm]", *rows)
     seen = hevopt("maps", "import", "b.csv", "--kind", "engine", *LIKE, "--full-load", "full.csv")
     assert 10 < float(seen.out.split("coverage: ")[1].split("%")[0]) < 40
@@ -353,7 +342,7 @@ def test_nedc_fuel_of_a_measured_machine_is_that_of_its_formula(hevopt, kind):
     speed, torque = np.meshgrid(rpm, np.arange(-120, 121, 5.0), indexing="ij")
     keep = (np.abs(speed * RPM * torque) < 20e3) & ((speed > 0) | (kind != "%"))
     speed, torque = speed[keep], torque[keep]
-    loss = machine_model.loss_w(car.machine, torque, speed * RPM)
+    loss = car.machines[0].loss_w(torque, speed * RPM)
     power = torque * speed * RPM
     with np.errstate(divide="ignore", invalid="ignore"):
         efficiency = np.where(power > 0, power / (power + loss), (power + loss) / power)
@@ -387,10 +376,10 @@ def test_a_machine_measured_as_a_motor_alone_is_assumed_symmetric_and_says_so(he
     seen = hevopt("maps", "import", "m.csv", "--kind", "machine")
     assert "ASSUMED that generating loses what motoring does" in seen.out
     assert "assumed: no --like: inertia_kgm2" in seen.out
-    machine = load_architecture(car_with("machine", "m.toml")).machine
+    machine = load_architecture(car_with("machine", "m.toml")).machines[0]
     assert machine.torque_max_nm == 100
     torque, speed = np.array([50.0, -50.0]), np.full(2, 3000 * RPM)
-    assert_allclose(machine_model.loss_w(machine, torque, speed), (50 + 700 + 200 + 900) / 4)
+    assert_allclose(machine.loss_w(torque, speed), (50 + 700 + 200 + 900) / 4)
 
 
 def test_the_same_input_gives_the_same_bytes(hevopt):
@@ -492,9 +481,7 @@ def test_an_engine_of_another_displacement_takes_its_drag_by_mean_pressure(hevop
         ).status
         == 0
     )
-    drag = engine_model.drag_torque_nm(
-        replace(ENGINE, displacement_m3=3196e-6), np.array(800 * RPM)
-    )
+    drag = replace(ENGINE.law, displacement_m3=3196e-6).drag_nm(np.array(800 * RPM))
     assert component("b.toml")["fuel_map"]["motoring_torque_nm"][0] == pytest.approx(float(drag))
 
 
@@ -509,7 +496,7 @@ def test_what_lies_below_the_lowest_measured_torque_is_assumed_and_no_coverage(h
     assert "g/s, " in seen.out and "NOT MEASURED but assumed, linear from 30 Nm" in seen.out
     covered = float(seen.out.split("coverage: ")[1].split("%")[0])
     speed = np.linspace(850, 5000, 2000) * RPM
-    full = engine_model.full_load_torque_nm(ENGINE, speed)
+    full = ENGINE.full_load_nm(speed)
     # A slack of 1 % of the largest torque belongs to the measured part.
     assert covered == pytest.approx(100 * (1 - 30 / full.mean()), abs=1.5)
     write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
@@ -565,13 +552,13 @@ def test_a_machines_full_load_curve_sets_its_limits_and_ends_its_map(hevopt):
     found = component("m.toml")
     assert found["torque_max_nm"] == pytest.approx(80) and found["speed_max_rpm"] == 5000
     assert found["power_max_w"] == pytest.approx(max(limit * rpm * RPM), rel=1e-5)
-    machine = load_architecture(car_with("machine", "m.toml")).machine
+    machine = load_architecture(car_with("machine", "m.toml")).machines[0]
     for sign in (1, -1):
-        held = machine_model.loss_w(machine, sign * limit * 0.999, rpm * RPM)
+        held = machine.loss_w(sign * limit * 0.999, rpm * RPM)
         assert np.isfinite(held).all()
-        assert np.isnan(machine_model.loss_w(machine, np.array(sign * 61.0), np.array(4000 * RPM)))
+        assert np.isnan(machine.loss_w(np.array(sign * 61.0), np.array(4000 * RPM)))
     # Between lines of the map as well, no torque beyond the curve.
-    assert machine_model.torque_limit_nm(machine, np.array(4500 * RPM)) == pytest.approx(25)
+    assert machine.limit_nm(np.array(4500 * RPM)) == pytest.approx(25)
 
 
 def test_a_shortfall_is_driven_with_what_a_masked_map_covers(hevopt):
@@ -580,7 +567,7 @@ def test_a_shortfall_is_driven_with_what_a_masked_map_covers(hevopt):
         grid_text("n [rpm] \\ T [Nm]", np.where(np.array(TORQUES[1:]) > 130, np.nan, fuel))
     )
     speeds = np.array(SPEEDS) * RPM
-    write("full.csv", "n [rpm],T [Nm]", SPEEDS, engine_model.full_load_torque_nm(ENGINE, speeds))
+    write("full.csv", "n [rpm],T [Nm]", SPEEDS, ENGINE.full_load_nm(speeds))
     seen = hevopt("maps", "import", "g.csv", "--kind", "engine", *LIKE, "--unit", "fuel=g/h",
                   "--full-load", "full.csv")  # fmt: skip
     assert "the map ends below the curve at 100% of the speeds" in seen.out, seen

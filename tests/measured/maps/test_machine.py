@@ -5,9 +5,8 @@ import pytest
 from map_bench import RPM, car_with, write
 
 from hevopt import load_architecture
-from hevopt.car import machine as machine_model
 
-MACHINE = load_architecture("C2").machine
+MACHINE = load_architecture("C2").machines[0]
 LIKE = ("--like", "machine_flywheel_18kw")
 IMPORT = ("maps", "import", "m.csv", "--kind", "machine", *LIKE)
 SPEEDS = (250, 500, 1000, 1500, 2000, 2500, 3000, 4000, 5000, 6000)
@@ -16,10 +15,10 @@ SPEEDS = (250, 500, 1000, 1500, 2000, 2500, 3000, 4000, 5000, 6000)
 def bench(signs=(1, -1)) -> tuple[np.ndarray, ...]:
     """rpm, Nm, shaft power and loss at shares of the limit, as a bench without a no-load test measures them."""
     rpm = np.repeat(SPEEDS, 7)
-    torque = machine_model.torque_limit_nm(MACHINE, rpm * RPM)
+    torque = MACHINE.limit_nm(rpm * RPM)
     torque = torque * np.tile([0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0], len(SPEEDS))
     rpm, torque = np.tile(rpm, len(signs)), np.concatenate([sign * torque for sign in signs])
-    return rpm, torque, rpm * RPM * torque, machine_model.loss_w(MACHINE, torque, rpm * RPM)
+    return rpm, torque, rpm * RPM * torque, MACHINE.loss_w(torque, rpm * RPM)
 
 
 @pytest.mark.parametrize("signs", [(1,), (1, -1)])
@@ -32,32 +31,32 @@ def test_the_loss_without_torque_is_assumed_near_the_truth_and_leaves_no_band(he
     assert (
         "not measured at 10 of 10 speeds (250 to 6000 rpm); ASSUMED to be that of the" in seen.out
     )
-    machine = load_architecture(car_with("machine", "m.toml")).machine
+    machine = load_architecture(car_with("machine", "m.toml")).machines[0]
     speed, share = np.meshgrid(np.linspace(250, 6000, 116) * RPM, np.linspace(-0.12, 0.12, 41))
-    load = share * machine_model.torque_limit_nm(MACHINE, speed)
-    found = machine_model.loss_w(machine, load, speed)
+    load = share * MACHINE.limit_nm(speed)
+    found = machine.loss_w(load, speed)
     assert not np.isnan(found).any()
-    truth = machine_model.loss_w(MACHINE, load, speed)
+    truth = MACHINE.loss_w(load, speed)
     # The loss at the lowest torque measured is 7 W above that at 0; the rest is the bend over speed.
     assert np.abs(found - truth).max() < 25 and np.abs(found - truth).mean() < 8
 
 
 def test_a_measured_loss_without_torque_is_kept(hevopt):
     rpm, torque, _, loss = bench()
-    still = machine_model.loss_w(MACHINE, np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
+    still = MACHINE.loss_w(np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
     columns = [*rpm, *SPEEDS], [*torque, *(0.0 for _ in SPEEDS)], [*loss, *still]
     write("m.csv", "speed [rpm],torque [Nm],loss [W]", *columns)
     seen = hevopt(*IMPORT)
     assert seen.status == 0 and "ASSUMED" not in seen.out, seen
-    machine = load_architecture(car_with("machine", "m.toml")).machine
-    found = machine_model.loss_w(machine, np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
+    machine = load_architecture(car_with("machine", "m.toml")).machines[0]
+    found = machine.loss_w(np.zeros(len(SPEEDS)), np.array(SPEEDS) * RPM)
     np.testing.assert_allclose(found, still, rtol=1e-6)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5])
 def test_the_full_load_curve_is_the_limit_and_the_map_reaches_up_to_it(hevopt, scale):
     rpm, torque = np.meshgrid([0.0, *SPEEDS], np.linspace(-120, 120, 25))
-    loss = machine_model.loss_w(MACHINE, torque, rpm * RPM)
+    loss = MACHINE.loss_w(torque, rpm * RPM)
     columns = "speed [rpm],torque [Nm],loss [W]", rpm.ravel(), torque.ravel(), loss.ravel()
     write("m.csv", *columns)
     # A curve that bends where the map has no line, partly well below the hyperbola of its largest power.
@@ -67,16 +66,16 @@ def test_the_full_load_curve_is_the_limit_and_the_map_reaches_up_to_it(hevopt, s
     assert seen.status == 0 and "full-load curve: torque is straight" in seen.out, seen
     car = load_architecture(car_with("machine", "m.toml"), {"machine.scale.power": scale})
     speed = np.linspace(0, 6000, 241)
-    limit = machine_model.torque_limit_nm(car.machine, speed * RPM)
+    limit = car.machines[0].limit_nm(speed * RPM)
     most_w = (curve_nm * curve_rpm * RPM).max()
     straight = np.interp(speed, curve_rpm, curve_nm)
     expected = np.minimum(straight, most_w / np.maximum(speed * RPM, 1e-9))
     assert (expected < straight).any() and (expected == straight).any()
     np.testing.assert_allclose(limit, scale * expected, rtol=1e-5)
     for sign in (1, -1):
-        found = machine_model.loss_w(car.machine, sign * limit, speed * RPM)
+        found = car.machines[0].loss_w(sign * limit, speed * RPM)
         assert not np.isnan(found).any()
-    assert machine_model.torque_limit_nm(car.machine, np.array([6001 * RPM])) == 0
+    assert car.machines[0].limit_nm(np.array([6001 * RPM])) == 0
 
 
 def test_electric_power_without_its_sign_while_generating_is_refused(hevopt):

@@ -54,7 +54,7 @@ def test_limits_count_the_steps_at_the_machine_s_limit(nedc):
     )  # fmt: skip
     case, _, trajectory = nedc.solved["D", "dp"]
     torque, speed = (trajectory.flows[f"machine_{name}"] for name in ("torque_nm", "speed_radps"))
-    machine = case.car.machine
+    machine = case.car.machines[0]
     near = (np.abs(torque) > 0.99 * machine.torque_max_nm) | (
         np.abs(torque * speed) > 0.99 * machine.power_max_w
     )

@@ -186,7 +186,7 @@ def test_the_car_of_a_design_has_its_values(designs, tmp_path):
     )
     car = car_of(read_study(tmp_path / "study.toml"), made[1])
     plain = load_architecture("C2")
-    assert car.machine.power_max_w == 9e3
+    assert car.machines[0].power_max_w == 9e3
     assert car.battery.power_max_discharge_w * 64 == plain.battery.power_max_discharge_w * 96
 
 
