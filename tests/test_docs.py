@@ -1,14 +1,17 @@
 """The documentation: every command and example on it runs, and the site builds without a warning."""
 
+import importlib.util
 import re
 import shlex
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from hevopt.cli import main
+from hevopt.studies.settings import Settings
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
@@ -69,3 +72,53 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site" / "theory" / "certificates.html").is_file()
+
+
+def test_every_setting_of_a_study_has_its_line():
+    page = (ROOT / "docs" / "reference" / "files.md").read_text()
+    table = page.split("## A study")[1].split("\n## ")[0]
+    for setting in {each.name for each in fields(Settings)} - {"changes"}:
+        assert f"`{setting}`" in table, setting
+
+
+def test_the_table_shown_is_the_table_printed(comparison_of):
+    page = (ROOT / "docs" / "reference" / "columns.md").read_text()
+    shown = {}
+    strategies = {row.strategy for row in comparison_of("nedc").rows}
+    for line in page.splitlines():
+        words = line.replace("†", "").split()
+        if len(words) > 10 and words[1] in strategies:
+            shown[words[0], words[1]] = words[2:]
+    rows = comparison_of("nedc").rows
+    assert set(shown) == {(row.architecture, row.strategy) for row in rows}
+    for row in rows:
+        words = shown[row.architecture, row.strategy]
+        assert float(words[0]) == pytest.approx(row.fuel_l_per_100km, abs=2e-3)
+        assert float(words[9]) == pytest.approx(row.bound_l_per_100km, abs=2e-3)
+
+
+def test_the_page_of_strategies_is_made(monkeypatch, tmp_path, capsys):
+    # One cycle here; the page in reports/ is made over all of them, in about a minute.
+    monkeypatch.setattr("hevopt.files.lookup.shipped_names", lambda kind, suffix: ["hwfet"])
+    page = tmp_path / "strategies.md"
+    monkeypatch.setattr("sys.argv", ["hevopt", "strategies", "--out", str(page)])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert not stop.value.code, capsys.readouterr().err
+    text, committed = page.read_text(), (ROOT / "reports" / "strategies.md").read_text()
+    for name in ("conventional", "dp", "convex", "mpc", "a_ecms", "sdp"):
+        assert f"| `{name}` |" in text and f"| `{name}` |" in committed
+    assert "## C2, gap %" in text and "hwfet" in text
+
+
+def test_benchmarks_measure_the_kernel_and_name_every_figure():
+    path = ROOT / "tests" / "benchmarks" / "run.py"
+    spec = importlib.util.spec_from_file_location("benchmarks", path)
+    benchmarks = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmarks)
+    problem = benchmarks.foreign_problem()
+    call, count = benchmarks.backward_call(problem, 101)
+    assert call().shape == (1401, 1, 101) and count > 1e6
+    committed = (ROOT / "reports" / "benchmarks.md").read_text()
+    for figure in ("dp kernel", "ratio", "first time", "--help", "lower-bound DP", "nodes 201"):
+        assert figure in committed

@@ -1,11 +1,16 @@
 """The page as a reader uses it, in a real browser."""
 
 import gzip
+import importlib.util
+import io
 import json
 import re
+from pathlib import Path
 
+import numpy as np
 import pytest
 from page_helpers import AXES, effect, find_browser, forty_rows, front, until
+from PIL import Image
 
 from hevopt.pages.comparison.page import comparison_page
 from hevopt.pages.render import fixed
@@ -249,3 +254,17 @@ def test_a_missing_browser_is_a_skip_and_a_failure_where_one_is_required(monkeyp
     monkeypatch.delenv("HEVOPT_REQUIRE_BROWSER")
     with pytest.raises(pytest.skip.Exception, match="chromium"):
         find_browser()
+
+
+def test_the_picture_of_the_readme_shows_what_the_page_draws_today(nedc, opened):
+    source = Path(__file__).parents[2] / "docs" / "picture.py"
+    spec = importlib.util.spec_from_file_location("picture", source)
+    picture = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(picture)
+    page = opened(nedc.path, viewport={"width": picture.WIDTH, "height": 800}).page
+    drawn, committed = (
+        np.array(Image.open(io.BytesIO(png)).convert("L").resize((60, 24)), dtype=float)
+        for png in (picture.picture_of(page), picture.OUT.read_bytes())
+    )
+    assert drawn.std() > 20  # bars on paper, no empty frame
+    assert np.abs(drawn - committed).mean() < 6  # grey of 256; fonts differ between machines
