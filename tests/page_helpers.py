@@ -69,7 +69,7 @@ class Opened:
             self.page.add_init_script(script)
         self.page.goto(path.as_uri())
         if wait:
-            self.page.wait_for_selector("html[data-drawn]", state="attached")
+            self.page.wait_for_selector("html[data-drawn]", state="attached", timeout=120_000)
 
 
 def until(page, condition: str, seconds: float = 20.0) -> None:
