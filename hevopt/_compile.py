@@ -14,35 +14,36 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeVar, cast
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
 
 _DIGEST_BYTES = hashlib.sha256().digest_size
+_Loop = TypeVar("_Loop", bound=Callable[..., Any])
 
 
-def compiled(*, inline: str = "never") -> Callable[[Callable], Callable]:
+def compiled(*, inline: Literal["never", "always"] = "never") -> Callable[[_Loop], _Loop]:
     """Decorator: numba.njit, kept on disk; without that where neither package nor home can be written."""
 
-    def decorate(function: Callable) -> Callable:
-        loop = numba.njit(inline=inline)(function)
+    def decorate(function: _Loop) -> _Loop:
+        loop: Any = numba.njit(inline=inline)(function)
         if isinstance(loop, Dispatcher):
             try:
-                loop._cache = _Cache(function)
+                loop._cache = _Cache(function)  # type: ignore[attr-defined]
             except RuntimeError as error:
                 if "no locator available" not in str(error):
                     raise
-        return loop
+        return cast(_Loop, loop)
 
     return decorate
 
 
-class _Cache(FunctionCache):
+class _Cache(FunctionCache):  # type: ignore[misc]
     """numba's cache, to which no state of the disk is an error."""
 
-    def __init__(self, function: Callable) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         self._cache_file = _Files(
             self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
@@ -59,7 +60,7 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)
 
 
-class _Files(IndexDataCacheFile):
+class _Files(IndexDataCacheFile):  # type: ignore[misc]
     """The compiled forms of one loop: without an index, two processes have nothing to disagree on."""
 
     def load(self, key: Any) -> Any:
@@ -79,7 +80,7 @@ class _Files(IndexDataCacheFile):
 
     def _path(self, key: Any) -> Path:
         types = hashlib.sha256(repr(key).encode()).hexdigest()
-        return Path(self._cache_path) / self._data_name(int(types[:15], 16))
+        return Path(self._cache_path, self._data_name(int(types[:15], 16)))
 
     def _digest(self, contents: bytes) -> bytes:
         stamp = repr((self._version, self._source_stamp, _loops_digest())).encode()

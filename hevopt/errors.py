@@ -61,14 +61,16 @@ class DataError(HevoptError):
     @property
     def faults(self) -> tuple[Fault, ...]:
         """The faults that the message lists; none where it is a message of its own."""
-        return self.args[1]
+        faults: tuple[Fault, ...] = self.args[1]
+        return faults
 
     @property
     def listed(self) -> list[str]:
         return [*map(str, self.faults), *self._more(f"{self._place}: ")] or [str(self)]
 
     def __str__(self) -> str:
-        message, faults, count = self.args
+        message: str = self.args[0]
+        faults, count = self.faults, self.args[2]
         if message or not faults:
             return message
         if count == 1:

@@ -72,7 +72,7 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
         )
     bound = float(np.interp(problem.start_j, grid, value[problem.start_mode]))
     most = abs(unreachable) + slope * 4.0 * (grid[-1] - grid[0])
-    return bound - 16.0 * EPSILON * choices.steps * most
+    return float(bound - 16.0 * EPSILON * choices.steps * most)
 
 
 def end_slack_j(problem: Problem) -> float:

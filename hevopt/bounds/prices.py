@@ -251,7 +251,9 @@ def maximise(
         scale *= 4.0
     if left.slope_kg > 0 and right is None:
         right = _Touch(np.inf, *steepest())
-    for _ in range(_LINES_MAX if right is not None else 0):
+    for _ in range(_LINES_MAX):
+        if right is None:
+            break
         best = max(line.value_kg for line in lines)
         crossing, top = _crossing(left, right)
         inside = left.scale < crossing < right.scale

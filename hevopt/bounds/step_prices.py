@@ -95,9 +95,10 @@ def line_above(inside: BatteryArrays) -> BatteryArrays | None:
         return None
     raised = np.sqrt(squared[[0, -1]] + max(over.max(), 0.0)) * (1 + 4 * EPSILON)
     width = 2 * (energy[-1] - energy[0]) / (inside.capacity_as * raised.sum())
+    discharge, charge = (np.full(2, ohm.min()) for ohm in ohms)
     return BatteryArrays(
-        np.array([0.0, width]), raised, *(np.full(2, ohm.min()) for ohm in ohms),
-        energy[[0, -1]], inside.capacity_as, inside.coulombic_efficiency,
+        np.array([0.0, width]), raised, discharge, charge, energy[[0, -1]], inside.capacity_as,
+        inside.coulombic_efficiency,
     )  # fmt: skip
 
 
@@ -114,7 +115,7 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     """
     choices = without_dominated(bounded_choices(problem))
     count = -(-choices.steps // _LP_STEPS)
-    ends = np.arange(count + 1) * choices.steps // count
+    ends = [n * choices.steps // count for n in range(count + 1)]
     price = np.zeros(choices.steps)
     low, _ = problem.window_j
     for begin, end in reversed(list(pairwise(ends))):
@@ -184,7 +185,8 @@ def _lp_part(
     if result.status != 0:
         raise SolverError(f"HiGHS stopped with status {result.status}: {result.message}")
     # A joule more after step t saves p: the multiplier of its row is -p.
-    return np.maximum(-result.ineqlin.marginals * (unit_kg / scale_j), 0.0)
+    prices: Array = np.maximum(-result.ineqlin.marginals * (unit_kg / scale_j), 0.0)
+    return prices
 
 
 def window_cells(problem: Problem, cells: int) -> WindowCells:
@@ -198,7 +200,5 @@ def window_cells(problem: Problem, cells: int) -> WindowCells:
     )
     edges = battery_model.energy_j(problem.battery, edges_soc)
     edges[[0, -1]] = inside.energy_j[[0, -1]]
-    return WindowCells(
-        edges, voltage[1:], *(np.minimum(ohm[1:], ohm[:-1]) for ohm in (discharge, charge)),
-        inside.coulombic_efficiency,
-    )  # fmt: skip
+    lowest = [np.minimum(ohm[1:], ohm[:-1]) for ohm in (discharge, charge)]
+    return WindowCells(edges, voltage[1:], lowest[0], lowest[1], inside.coulombic_efficiency)

@@ -115,11 +115,10 @@ class Battery:
         first, last = ends[:, :1], ends[:, 1:]
         points = np.stack([curve[inner] for curve in whole[:4]])
         low, high = self.granted_window_j
+        soc, voltage, discharge, charge = np.concatenate([first, points, last], axis=1)
+        energy = np.concatenate([[low], whole.energy_j[inner], [high]])
         return BatteryArrays(
-            *np.ascontiguousarray(np.concatenate([first, points, last], axis=1)),
-            np.concatenate([[low], whole.energy_j[inner], [high]]),
-            whole.capacity_as,
-            whole.coulombic_efficiency,
+            soc, voltage, discharge, charge, energy, whole.capacity_as, whole.coulombic_efficiency
         )
 
 
@@ -129,12 +128,14 @@ def energy_j(battery: Battery, soc: float | Array) -> Array:
     step = np.asarray(soc) - battery.soc[i]
     slope = np.diff(battery.open_circuit_v)[i] / np.diff(battery.soc)[i]
     volt_step = (battery.open_circuit_v[i] + slope * step / 2) * step
-    return battery.point_energy_j[i] + battery.capacity_as * volt_step
+    stored_j: Array = battery.point_energy_j[i] + battery.capacity_as * volt_step
+    return stored_j
 
 
 def soc(battery: Battery, energy: float | Array) -> Array:
     """State of charge at a stored energy: the inverse of `energy_j`."""
-    return states(battery, energy)[0]
+    at: Array = states(battery, energy)[0]
+    return at
 
 
 def states(battery: Battery, energy: float | Array) -> Array:
@@ -158,7 +159,8 @@ def chemical_power_w(
 ) -> Array:
     """Rate at which stored energy falls for a terminal power; NaN beyond what the voltage can deliver."""
     chemical, _ = source_power_w(power_w, open_circuit_v, resistance_ohm)
-    return np.where(power_w < 0, battery.coulombic_efficiency * chemical, chemical)
+    drain_w: Array = np.where(power_w < 0, battery.coulombic_efficiency * chemical, chemical)
+    return drain_w
 
 
 def best_voltage_and_resistance(battery: Battery, charging: bool) -> tuple[float, float]:
@@ -195,7 +197,8 @@ def power_limits_w(battery: Battery) -> tuple[float, float]:
 def within_limits(battery: Battery, power_w: Array) -> Flags:
     """Where the battery can deliver or take a power at every SOC of its window, rounding aside."""
     least, greatest = power_limits_w(battery)
-    return (power_w >= least * (1 + _ROUNDING)) & (power_w <= greatest * (1 + _ROUNDING))
+    within: Flags = (power_w >= least * (1 + _ROUNDING)) & (power_w <= greatest * (1 + _ROUNDING))
+    return within
 
 
 def _least_delivered_w(voltage: Array, ohm: Array, current_a: float) -> float:

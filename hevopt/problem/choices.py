@@ -4,7 +4,7 @@ Entry i of a list is one control at one step. The entries of step k that lead to
 first[k, m] <= i < first[k, m + 1].
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from hevopt.errors import InfeasibleError
 from hevopt.problem._choices_kernels import undominated
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.problem import Problem
+
+Number = TypeVar("Number", bound=np.generic)
 
 
 class Choices(NamedTuple):
@@ -37,7 +39,7 @@ class Choices(NamedTuple):
         """Number of steps."""
         return len(self.step_s)
 
-    def spread(self, per_step: NDArray) -> NDArray:
+    def spread(self, per_step: NDArray[Number]) -> NDArray[Number]:
         """(entry,) a value per step, repeated for each of the step's entries."""
         return np.repeat(per_step, self.first[:, -1] - self.first[:, 0])
 

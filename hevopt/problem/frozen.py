@@ -3,13 +3,15 @@
 An array that is only marked as read-only is not enough: a view taken before still writes to it.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from hevopt.errors import DataError
 
 
-def frozen(name: str, values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray:
+def frozen(name: str, values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArray[Any]:
     """A copy of the values that cannot be changed; the array itself where it is one already.
 
     Raises DataError, naming what the values are, where they are no numbers or the type cannot hold them.
@@ -36,7 +38,7 @@ def frozen(name: str, values: ArrayLike, dtype: DTypeLike = np.float64) -> NDArr
     return np.frombuffer(held.tobytes(), wanted).reshape(held.shape)
 
 
-def _is_frozen(array: NDArray) -> bool:
+def _is_frozen(array: NDArray[Any]) -> bool:
     base = array.base
     return array.flags.c_contiguous and isinstance(
         base.base if type(base) is np.ndarray else base, bytes

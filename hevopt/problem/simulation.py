@@ -7,6 +7,7 @@ window is an error, never clipped. The end charge is not judged here: a row that
 """
 
 from collections.abc import Mapping
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from hevopt.errors import InfeasibleError
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.flows import Flows
 from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.table import REJECT_WORDS, ControlTable
 
@@ -42,7 +44,7 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     switch_kg = table.switch_fuel_kg[before, mode]
     fuel_kg = table.fuel_kg[steps, control] + switch_kg
     nox_kg = table.nox_kg[steps, control]
-    flows = table.flows.along(control)
+    flows = cast(Flows, table.flows).along(control)
     flows |= _battery_flows(problem, energy_j, power_w)
     return Trajectory(
         problem=problem,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import IntFlag
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ class Signals:
     def __post_init__(self) -> None:
         _freeze(self, {"gear": np.int64, "clutch_open": np.bool_}, "signals: ")
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(getattr(self, part.name) for part in fields(self))
 
 
@@ -143,7 +143,7 @@ class ControlTable:
         modes = frozen("mode", np.zeros(fuel.shape[1]) if mode is None else mode, np.int64)
         switch = _no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
         switch = frozen("switch_fuel_kg", switch)
-        allowed = np.ones(switch.shape) if switch_allowed is None else switch_allowed
+        allowed = np.ones(switch.shape, np.bool_) if switch_allowed is None else switch_allowed
         return cls(
             time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
             step_s=steps,
@@ -166,7 +166,7 @@ class ControlTable:
         self._check_shapes()
         self._check_values()
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made by the constructor, so that they cannot be changed either."""
         parts = {part.name: getattr(self, part.name) for part in fields(self)}
         if isinstance(self.flows, GivenFlows):
@@ -227,9 +227,10 @@ class ControlTable:
     @property
     def feasible(self) -> NDArray[np.bool_]:
         """(time, control) True where the control can be used."""
-        return self.reject == 0
+        usable: NDArray[np.bool_] = self.reject == 0
+        return usable
 
-    def labels_of(self, control: NDArray[np.int64]) -> dict[str, list]:
+    def labels_of(self, control: NDArray[np.int64]) -> dict[str, list[Any]]:
         """Column name -> what the labels say of each of some controls; a gear of 0 is none, or the cycle's."""
         labels = [self.controls[c] for c in control]
         return {

@@ -74,6 +74,9 @@ def cell_of(problem: Problem) -> Cell:
     corner, _ = lower_hulls(np.array([[0, len(points)]]), -squared, energy)
     slope = np.diff(squared[corner]) / np.diff(energy[corner])
     intercept = squared[corner][:-1] - slope * (energy[corner][:-1] - energy[0])
-    ohm = [best_voltage_and_resistance(pack, charging)[1] for charging in (False, True)]
-    efficiency = pack.coulombic_efficiency
-    return Cell(intercept, slope, *ohm, efficiency, float(energy[0]), float(energy[-1]))
+    discharge_ohm, charge_ohm = (
+        best_voltage_and_resistance(pack, charging)[1] for charging in (False, True)
+    )
+    return Cell(
+        intercept, slope, discharge_ohm, charge_ohm, pack.coulombic_efficiency, float(energy[0]), float(energy[-1])
+    )  # fmt: skip

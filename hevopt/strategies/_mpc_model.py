@@ -70,4 +70,5 @@ def _recoverable_j(signals: Signals | None, cheapest_j: Array, last: Indices) ->
     returned = np.cumsum(np.where(braking, -cheapest_j, 0.0))[last]
     dropped = np.cumsum(np.where(braking, drop, 0.0))[last]
     rate = np.divide(returned, dropped, out=np.zeros_like(returned), where=dropped > 0)
-    return rate * square[last]
+    energy_j: Array = rate * square[last]
+    return energy_j

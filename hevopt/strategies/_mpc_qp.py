@@ -9,6 +9,7 @@ The multiplier of row t is the price of stored energy after step t; at the end i
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,9 @@ class HorizonSolver:
 
     def __init__(self) -> None:
         self.fallbacks = 0
-        self._steps, self._osqp, self._last = 0, None, None
+        self._steps = 0
+        self._osqp: Any = None
+        self._last: tuple[Array, Array] | None = None
 
     def solve(self, qp: PreviewQp, place: str) -> tuple[Array, Array]:
         """Energy drawn, slack included, and price of stored energy, (step,) each; `place` is for messages."""
@@ -97,7 +100,7 @@ def _vectors(qp: PreviewQp) -> tuple[Array, Array, Array, Array]:
     return diagonal, q, lower, upper
 
 
-def _matrices(n: int):
+def _matrices(n: int) -> tuple[Any, Any]:
     """Quadratic form (3n, 3n), a full diagonal, and rows (4n, 3n): energy balance, then bounds."""
     from scipy import sparse
 

@@ -125,4 +125,5 @@ def sweep(
 @compiled(inline="always")
 def _between(values: Array, place: float) -> float:
     j = min(int(place), len(values) - 2)
-    return values[j] + (place - j) * (values[j + 1] - values[j])
+    value: float = values[j] + (place - j) * (values[j + 1] - values[j])
+    return value

@@ -9,7 +9,9 @@ The charging power is raised level by level until the charge is neutral; the las
 then share the cycle, changing once on the way, so that the end charge comes out close.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -121,7 +123,11 @@ def is_eligible(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
     return outcome.inside and worth_kg <= share * outcome.cost_kg
 
 
-def best_plan(rules: Rules, members: list[tuple[dict, Outcome]], figure) -> Plan:
+def best_plan(
+    rules: Rules,
+    members: list[tuple[dict[str, Any], Outcome]],
+    figure: Callable[[Mapping[str, Any]], float],
+) -> Plan:
     """The eligible member of least figure; the whole family is its calibration, for the curve."""
     calibration = [
         {
@@ -214,7 +220,7 @@ def _step_minimum(choices: Choices, figure: Array) -> Array:
     return np.minimum.reduceat(figure, choices.first[:, 0])
 
 
-def _first_true(low: int, high: int, holds) -> int:
+def _first_true(low: int, high: int, holds: Callable[[int], bool]) -> int:
     """The first n in (low, high] at which `holds` turns true, given that it is false at low and true at high."""
     while high - low > 1:
         middle = (low + high) // 2

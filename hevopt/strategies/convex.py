@@ -52,7 +52,7 @@ class _Search:
         self.problem = problem
         self.choices = choices_of(problem)
         self.reach: Reach = reach_of(problem, self.choices, problem.end_min_j)
-        self.best_cost_kg, self.best_control = np.inf, None
+        self.best_cost_kg, self.best_control = np.inf, np.empty(0, np.int64)
 
     def follow(self, solution: Solution) -> Indices:
         """(time,) modes of the shortest path under a solution's prices; rolls out around it on the way."""

@@ -78,7 +78,7 @@ def _search(
     problem, choices = setting.problem, setting.every
     low, high = problem.window_j
     centre = np.full(choices.steps + 1, (low + high) / 2)
-    best_cost, best, promises = np.inf, None, []
+    best_cost, best, promises = np.inf, np.empty(0, np.int64), list[float]()
     for band in bands:
         cell = band * (high - low) / (nodes - 1)
         grid = _grid_around(problem, centre, cell, nodes)

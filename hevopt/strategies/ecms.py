@@ -38,7 +38,8 @@ class _Search:
         self.bound_reach = reach_of(problem, self.choices, problem.end_min_j)
         self.free_reach = reach_of(problem, self.choices, problem.window_j[0])
         self.drain_j = drain_at_j(problem, self.choices, problem.start_j)
-        self.best_cost_kg, self.best_control, self.best_prices = np.inf, None, None
+        self.best_cost_kg = np.inf
+        self.best_control, self.best_prices = np.empty(0, np.int64), (np.nan, np.nan)
 
     def surplus_j(self, price_kgpj: Array, *, to_the_end: bool = False) -> float:
         """Stored energy above the asked end charge under (time,) prices; `to_the_end`: never below it."""

@@ -85,7 +85,7 @@ class Controller:
 
     def _charge(self, k: int) -> float:
         """Stored energy above the wanted, in units."""
-        return (self.energy_j - self.model.wanted_j[k]) / self.unit_j
+        return float(self.energy_j - self.model.wanted_j[k]) / self.unit_j
 
     def _mode_path(self, k: int) -> Indices:
         """(step,) modes of the best path through the preview; step 2 above."""

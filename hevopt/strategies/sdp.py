@@ -115,7 +115,7 @@ def chain_of(signals: Sequence[Signals]) -> Chain:
     _, member = np.unique(bins, axis=1, return_inverse=True)
     member = member.ravel()
     count = np.bincount(member)
-    centres = [np.bincount(member, weights=values) / count for values in (speed, power)]
+    speed_mps, power_w = (np.bincount(member, weights=values) / count for values in (speed, power))
     following = np.concatenate(
         [
             np.roll(part, -1)
@@ -127,7 +127,8 @@ def chain_of(signals: Sequence[Signals]) -> Chain:
     visits += _SMOOTHING * count / count.sum()
     rows, row_class = _representatives(member, power)
     share = 1.0 / np.bincount(row_class)[row_class]
-    return Chain(*centres, visits / visits.sum(axis=1, keepdims=True), rows, row_class, share)
+    transition = visits / visits.sum(axis=1, keepdims=True)
+    return Chain(speed_mps, power_w, transition, rows, row_class, share)
 
 
 def classes_of(chain: Chain, signals: Signals) -> Indices:
@@ -136,7 +137,8 @@ def classes_of(chain: Chain, signals: Signals) -> Indices:
     away += ((signals.wheel_power_w[:, None] - chain.power_w) / POWER_BIN_W) ** 2
     moving = signals.speed_mps > 0
     away[np.not_equal.outer(moving, chain.speed_mps > 0)] += 1e6
-    return np.argmin(away, axis=1)
+    nearest: Indices = np.argmin(away, axis=1)
+    return nearest
 
 
 def _representatives(member: Indices, power_w: Array) -> tuple[Indices, Indices]:
