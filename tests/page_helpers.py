@@ -19,6 +19,9 @@ FLAGS = [
     "--disable-sync", "--no-first-run", "--disable-dev-shm-usage",
 ]  # fmt: skip
 
+# However busy the machine; what comes at all comes within seconds on an idle one.
+PATIENCE_S = 300.0
+
 AXES = """() => [...document.querySelectorAll('.plot')].flatMap(plot => Object.entries(plot._fullLayout)
   .filter(([name]) => /^[xy]axis[0-9]*$/.test(name) && plot._fullLayout._plots)
   .filter(() => (plot._fullData || []).some(trace => trace.type !== 'sankey'))
@@ -60,6 +63,7 @@ class Opened:
 
     def __init__(self, browser, path: Path, *, wait: bool = True, script: str = "", **settings):
         self.context = browser.new_context(accept_downloads=True, **settings)
+        self.context.set_default_timeout(1000 * PATIENCE_S)
         self.page = self.context.new_page()
         self.trouble, self.requests = [], []
         self.page.on("console", lambda message: self.trouble.append(message.text))
@@ -72,7 +76,7 @@ class Opened:
             self.page.wait_for_selector("html[data-drawn]", state="attached", timeout=120_000)
 
 
-def until(page, condition: str, seconds: float = 20.0) -> None:
+def until(page, condition: str, seconds: float = PATIENCE_S) -> None:
     """Wait for a condition of the page; the page's own policy forbids the browser to wait for a text."""
     end = monotonic() + seconds
     while not page.evaluate(condition):

@@ -147,7 +147,7 @@ def check_sound(store):
             assert connection.execute("PRAGMA integrity_check").fetchone() == ("ok",)
             keys = connection.execute("SELECT count(*), count(DISTINCT key) FROM cases").fetchone()
             assert keys[0] == keys[1]
-            halves = "SELECT count(*) FROM cases WHERE status = 'ok' AND json_valid(row) IS NOT 1"
+            halves = "SELECT count(*) FROM cases WHERE ending = 'ok' AND json_valid(row) IS NOT 1"
             assert connection.execute(halves).fetchone() == (0,)
         finally:
             connection.close()

@@ -7,7 +7,7 @@ import time
 from zlib import crc32
 
 from hevopt.errors import SolverError
-from hevopt.sweeps.plan.jobs import Case, Job, Outcome
+from hevopt.sweeps.plan.jobs import Case, Failure, Job, Outcome
 
 
 def jobs(count, cases=2, does=None):
@@ -38,7 +38,7 @@ def work(job, guard):
                 extra = act(job.changes.get("does", {}).get(case.key))
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
-            yield Outcome(case.key, "failed", None, text, 0.001)
+            yield Outcome(case.key, "failed", None, Failure(text), 0.001)
         else:
             yield Outcome(case.key, "ok", row_of(case.key) | extra, None, 0.001)
 
@@ -96,7 +96,7 @@ def fails_when_asked(job, guard):
     """Every third key fails for as long as a file says so."""
     failing = os.path.exists(os.environ["SWEEP_FAILS"])
     return [
-        Outcome(o.key, "failed", None, "asked to", 0.0)
+        Outcome(o.key, "failed", None, Failure("asked to"), 0.0)
         if failing and crc32(o.key.encode()) % 3 == 0
         else o
         for o in work(job, guard)
@@ -131,8 +131,11 @@ def act(what):
         case ["note", file]:
             with open(file, "a") as f:
                 f.write("ran\n")
-        case "rest":
-            time.sleep(1.0)
+        case ["await", file]:
+            deadline = time.monotonic() + 100
+            while not os.path.exists(file):
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
         case "threads":
             return _threads()
         case "raise":

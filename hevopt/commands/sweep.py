@@ -195,7 +195,7 @@ def _run(
             if prune and not plan.prunable:
                 progress.say(_NOTHING_TO_PRUNE)
             others = opened.others()
-            if others and not opened.statuses():
+            if others and not opened.endings():
                 progress.say(
                     f"{store} holds {others} results, none that this study asks for as it is now (inputs, "
                     "strategies, hevopt or a library changed): they stay, and everything is run"
@@ -229,7 +229,7 @@ def _rehearse(
     done: set[str] = set()
     if store.exists() and store.stat().st_size:
         with open_to_read(store) as reader:
-            done = keys & settled(reader.statuses(), retry_failed=retry_failed)
+            done = keys & settled(reader.endings(), retry_failed=retry_failed)
     _say_plan(plan, len(keys), len(done))
     for key, (asked, distinct) in merged_values(contents).items():
         write(

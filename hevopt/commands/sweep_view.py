@@ -96,10 +96,11 @@ def duration(seconds: float) -> str:
 
 
 def counted(counts: dict[str, int]) -> str:
-    """The cases of a plan by outcome, in one line."""
-    named = ("ok", "infeasible", "failed", "pruned", "missing")
-    listed = ", ".join(f"{counts[name]} {name}" for name in named if counts[name])
-    total = sum(counts[name] for name in named)
+    """The cases of a plan by ending, in one line."""
+    from hevopt.sweeps.plan.jobs import Ending
+
+    listed = ", ".join(f"{counts[ending]} {ending}" for ending in Ending if counts[ending])
+    total = sum(counts[ending] for ending in Ending)
     other = (
         f"; {counts['other']} more results are kept, of other inputs, strategies or code"
         if counts["other"]
@@ -109,28 +110,35 @@ def counted(counts: dict[str, int]) -> str:
 
 
 def reasons(reader: "Reader") -> list[str]:
-    """The most frequent errors of failed and infeasible cases, each with its number and the first design it hit."""
+    """The most frequent errors of cases without a row, and of lost proofs, each with the first design hit."""
+    from hevopt.sweeps.plan.jobs import Ending
     from hevopt.sweeps.store.reasons import Reasons
 
-    found = Reasons()
+    found, lost = Reasons(), Reasons()
     for record in reader.records():
-        if record.error is not None:
-            found.add(record.outcome, record.error, record.design)
+        if record.failure is not None:
+            found.add(record.ending, record.failure.headline, record.design)
+        for kind, why in ((record.row or {}).get("lost_proofs") or {}).items():
+            lost.add(kind, why, record.design)
     return [
-        *_reasons(found.of("failed"), "failed"),
-        *_reasons(found.of("infeasible"), "infeasible"),
+        line
+        for what, reasons in (
+            *((ending, found.of(ending)) for ending in (Ending.FAILED, Ending.INFEASIBLE)),
+            *((f"{kind} not found", lost.of(kind)) for kind in lost),
+        )
+        for line in _reasons(reasons, what)
     ]
 
 
-def _reasons(found: "list[Reason]", outcome: str) -> Iterator[str]:
+def _reasons(found: "list[Reason]", what: str) -> Iterator[str]:
     for reason in found[:_ERRORS_LISTED]:
         text = reason.example
         text = text if len(text) <= _ERROR_CHARACTERS else text[: _ERROR_CHARACTERS - 3] + "..."
         times = "once" if reason.count == 1 else f"{reason.count} times, first"
-        yield f"{outcome} {times} in design {reason.design}: {text}"
+        yield f"{what} {times} in design {reason.design}: {text}"
     if len(found) > _ERRORS_LISTED:
         more = len(found) - _ERRORS_LISTED
-        yield f"and {more} more kinds of error of {outcome} cases; --export lists them"
+        yield f"{what}: and {more} more kinds of reason; --export lists them"
 
 
 def discarded(reader: "Reader") -> list[str]:

@@ -1,4 +1,4 @@
-"""Carried out of hevopt/files.py."""
+"""Values and texts of others as a message may quote them."""
 
 from datetime import date, time
 
@@ -35,3 +35,8 @@ def encodable(text: str) -> str:
 def printable(text: str) -> str:
     """The text with what a terminal could take for a command, such as a line end, as '?'."""
     return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def first_line(error: object) -> str:
+    """What a message, such as another library's, says first."""
+    return printable((str(error).splitlines() or [type(error).__name__])[0].rstrip(":"))

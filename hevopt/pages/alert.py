@@ -1,4 +1,4 @@
-"""Carried out of hevopt/pages/alerts.py."""
+"""What the checks of a page, of a comparison as of a sweep, say."""
 
 from dataclasses import dataclass
 

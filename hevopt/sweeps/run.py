@@ -12,7 +12,7 @@ from hevopt.errors import DataError
 from hevopt.files.lookup import dumped_json
 from hevopt.studies.provenance import code_digest, digest, files_digests, versions
 from hevopt.sweeps.plan.designs import Designs, cars_of, designs_of, groups_of
-from hevopt.sweeps.plan.jobs import BOUND, Job, Planned, jobs_of
+from hevopt.sweeps.plan.jobs import BOUND, Ending, Job, Planned, jobs_of
 from hevopt.sweeps.plan.prune import Bounded, follows, mean_bound, mean_objective, search
 from hevopt.sweeps.plan.study_file import SweepStudy
 from hevopt.sweeps.store.store import Store
@@ -138,9 +138,9 @@ def begin(plan: Plan, store: Store, command: str) -> None:
     store.begin(meta, ((d.number, d.values) for d in plan.designs), plan.planned)
 
 
-def settled(statuses: Mapping[str, str], *, retry_failed: bool) -> set[str]:
+def settled(endings: Mapping[str, str], *, retry_failed: bool) -> set[str]:
     """Keys of the cases that need not be run: infeasible is a result, and failed unless it is to be tried again."""
-    return {key for key, status in statuses.items() if status != "failed" or not retry_failed}
+    return {key for key, end in endings.items() if end != Ending.FAILED or not retry_failed}
 
 
 def run_sweep(
@@ -156,7 +156,7 @@ def run_sweep(
 
     What is stored does not depend on backend and workers, except for the seconds. Raises Stopped, or StoreGone.
     """
-    done = settled(store.statuses(), retry_failed=retry_failed)
+    done = settled(store.endings(), retry_failed=retry_failed)
     missing = {case.key for case in plan.planned} - done
     progress = Progress(len(missing))
     with ExitStack() as stack:
@@ -197,7 +197,7 @@ class _Course:
                 self.store.check_place()
                 self.store.add(outcomes)
                 self.progress.done += len(outcomes)
-                self.progress.failed += sum(o.status == "failed" for o in outcomes)
+                self.progress.failed += sum(o.ending == Ending.FAILED for o in outcomes)
                 self.missing.difference_update(o.key for o in outcomes)
                 self.watch.progress(self.progress)
                 if self.watch.stop():

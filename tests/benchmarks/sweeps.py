@@ -55,7 +55,7 @@ def results(store: Path) -> list[tuple[object, ...]]:
     """All that is stored of a sweep but the seconds, as text to the last digit."""
     with open_to_read(store) as reader:
         return [
-            (r.design, r.cycle, r.strategy, r.nox_weight, r.outcome, json.dumps(r.row, sort_keys=True))
+            (r.design, r.cycle, r.strategy, r.nox_weight, r.ending, json.dumps(r.row, sort_keys=True))
             for r in reader.records()
         ]  # fmt: skip
 

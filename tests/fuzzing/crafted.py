@@ -14,7 +14,7 @@ from hevopt.sweeps.store.store import SCHEMA
 _COLUMNS = {
     "meta": ("name", "value"), "designs": ("number", "parameters"),
     "plan": ("design", "cycle", "strategy", "nox_weight", "key"),
-    "cases": ("key", "status", "row", "error", "seconds"),
+    "cases": ("key", "ending", "row", "failure", "seconds"),
     "pruned": ("design", "bound", "incumbent", "objective"),
 }  # fmt: skip
 _ENDLESS = "WITH RECURSIVE endless(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM endless)"

@@ -43,7 +43,7 @@ def _saved() -> bytes:
 
 
 def _store() -> bytes:
-    from hevopt.sweeps.plan.jobs import Outcome
+    from hevopt.sweeps.plan.jobs import Failure, Outcome
     from hevopt.sweeps.plan.prune import Pruned
     from hevopt.sweeps.plan.study_file import read_study
     from hevopt.sweeps.run import begin, plan_of
@@ -59,7 +59,9 @@ def _store() -> bytes:
             for job in plan.jobs[:-1]:
                 store.add(run_job(job))
             last = plan.jobs[-1]
-            store.add([Outcome(last.cases[0].key, "failed", None, "no such plan\nand why", 1.0)])
+            store.add(
+                [Outcome(last.cases[0].key, "failed", None, Failure("no such plan\nand why"), 1.0)]
+            )
             keys = {case.key for case in last.cases}
             design = max(case.design for case in plan.planned if case.key in keys)
             store.prune([Pruned(design, 9.0, 0, 8.0)])

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from hevopt import DataError, build_problem, load_architecture, load_cycle, simulate, solve
 from hevopt.files.frames import csv_of
 from hevopt.output import file_tables as outputs
+from hevopt.pages.comparison.saved import load_results
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row
 from hevopt.studies.status import OK, Status
@@ -207,4 +208,6 @@ def test_a_proof_that_was_not_found_is_named_in_json_and_below_the_table(hevopt,
     ):
         lost = json.loads(hevopt(*command, "--json").out)["lost_proofs"]
         assert lost == {"C2, costate prices": "HiGHS stopped with status 4"}
+    hevopt(*command, "--save", "all.json.gz")
+    assert load_results(Path("all.json.gz")).lost_proofs == lost
     assert "proof not found: C2, costate prices: HiGHS stopped" in hevopt(*words).out

@@ -57,7 +57,7 @@ def test_the_store_has_to_the_last_bit_what_the_jobs_give_here(tmp_path):
     assert len(records) == 24 == len(here)
     for record in records:
         outcome = here[keys[record.design, record.strategy]]
-        assert (record.outcome, record.row, record.error) == (outcome.status, outcome.row, None)
+        assert (record.ending, record.row, record.failure) == (outcome.ending, outcome.row, None)
 
 
 def test_only_what_is_missing_is_run_and_failures_only_when_asked(tmp_path, monkeypatch, here):

@@ -89,6 +89,7 @@ def _loose(results: Results) -> Alert:
         for name, gap in known.items()
         if gap > LOOSE_PERCENT
     ]
+    lost = [f"{which}: tried and not found: {why}." for which, why in results.lost_proofs.items()]
     least = {name: _burns_nothing(results, name) for name in gaps if name not in known}
     none = [
         f"{name}: the bound is 0; it holds nothing." for name, is_0 in least.items() if not is_0
@@ -104,7 +105,9 @@ def _loose(results: Results) -> Alert:
             f"Optimum and bound are at most {max(known[widest], 0.0):.3f} % apart ({widest}); "
             f"loose would be {LOOSE_PERCENT:g} %."
         )
-    return Alert("Certificates", bool(loose or none), loose + none + tight, grave=bool(loose))
+    return Alert(
+        "Certificates", bool(loose or lost or none), loose + lost + none + tight, grave=bool(loose)
+    )
 
 
 def _burns_nothing(results: Results, car: str) -> bool:

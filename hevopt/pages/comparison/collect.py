@@ -118,6 +118,9 @@ class Collector:
             failures={
                 name: without_folders(str(error)) for name, error in comparison.failures.items()
             },
+            lost_proofs={
+                name: without_folders(why) for name, why in comparison.lost_proofs.items()
+            },
             published=[
                 PublishedFigure(**statement._asdict())
                 for statement in (published_beside(comparison) if published else [])

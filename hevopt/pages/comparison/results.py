@@ -240,6 +240,7 @@ class Results(FileModel):
     changes: what of the cars' files was changed, line by line
     end_asked: car -> state of charge asked at the end, where it is another than the start's
     inputs: file -> SHA-256; versions: name -> version; failures: architecture, or it and strategy -> message
+    lost_proofs: architecture and kind of proof -> why it was tried and not found
     """
 
     format: Literal["hevopt comparison 2"] = FORMAT
@@ -258,6 +259,7 @@ class Results(FileModel):
     cars: dict[str, CarFigures]
     rows: list[Row]
     failures: dict[str, str]
+    lost_proofs: dict[str, str] = Field(default_factory=dict)
     published: list[PublishedFigure]
     pareto: list[ParetoFront] | None = None
     sensitivity: list[Sensitivity] | None = None

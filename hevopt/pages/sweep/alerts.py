@@ -10,7 +10,8 @@ from hevopt.pages.alert import Alert
 from hevopt.pages.sweep.data import Figures, Scalar, Sweep
 from hevopt.pages.sweep.effects import is_log, is_numeric
 from hevopt.pages.sweep.verdict import GROUPS_MAX, Group, shown_value
-from hevopt.sweeps.plan.jobs import NOX_WEIGHT
+from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
+from hevopt.sweeps.store.reasons import Reason
 
 LOOSE_PERCENT = 0.5
 _MESSAGES_LISTED = 5
@@ -26,12 +27,12 @@ def alerts(sweep: Sweep, groups: Sequence[Group]) -> list[Alert]:
 
 
 def _failed(sweep: Sweep) -> Alert:
-    lines = _reasons(sweep, "failed")
+    lines = _cases(sweep.tally.reasons.of(Ending.FAILED))
     return Alert("Failed cases", bool(lines), lines or ["No case failed."])
 
 
 def _infeasible(sweep: Sweep) -> Alert:
-    lines = _reasons(sweep, "infeasible")
+    lines = _cases(sweep.tally.reasons.of(Ending.INFEASIBLE))
     nothing = "No case is infeasible."
     return Alert("Infeasible cases", bool(lines), lines or [nothing], grave=False)
 
@@ -69,13 +70,12 @@ def _discarded(sweep: Sweep) -> Iterator[Alert]:
         yield Alert("Pruned designs", True, [line], grave=False)
 
 
-def _reasons(sweep: Sweep, outcome: str) -> list[str]:
-    """The most frequent reasons."""
-    found = sweep.tally.reasons.of(outcome)
+def _cases(found: Sequence[Reason], what: str = "") -> list[str]:
+    """The most frequent reasons, and of what they are."""
     lines = [
-        f"{reason.count} cases, such as design {reason.design}: {reason.example}"
+        f"{reason.count} cases, such as design {reason.design}: {what}{reason.example}"
         if reason.count > 1
-        else f"1 case, design {reason.design}: {reason.example}"
+        else f"1 case, design {reason.design}: {what}{reason.example}"
         for reason in found[:_MESSAGES_LISTED]
     ]
     if len(found) > _MESSAGES_LISTED:
@@ -84,7 +84,7 @@ def _reasons(sweep: Sweep, outcome: str) -> list[str]:
 
 
 def _complete(sweep: Sweep) -> Alert:
-    missing = sweep.tally.counts["missing"]
+    missing = sweep.tally.counts[Ending.MISSING]
     if not missing:
         return Alert("Completeness", False, ["Every planned case has a result."])
     line = f"{missing} of {sweep.tally.counts.total()} cases have no result yet: the best design may change."
@@ -109,6 +109,8 @@ def _certificates(sweep: Sweep, groups: Sequence[Group]) -> Alert:
             f" up to {gaps[widest]:.2f} % (design {figures.number[widest]}): it is not known whether bound or "
             "strategies are to blame."
         )
+    for kind in sweep.tally.lost:
+        lines += _cases(sweep.tally.lost.of(kind), f"{kind} were tried and not found: ")
     unbound = int((np.isfinite(figures.objective) & np.isnan(figures.bound)).sum())
     if unbound:
         lines.append(f"{unbound} designs have no bound.")

@@ -17,7 +17,7 @@ from hevopt.files.lookup import without_folders
 from hevopt.files.shown import printable
 from hevopt.files.writing import csv_cells
 from hevopt.studies.status import OK, Status
-from hevopt.sweeps.plan.jobs import BOUND, NOX_WEIGHT
+from hevopt.sweeps.plan.jobs import BOUND, NOX_WEIGHT, Ending
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store.export import cases_csv
 from hevopt.sweeps.store.reading import Record, inputs_in, open_to_read
@@ -96,13 +96,15 @@ class Figures:
 class Tally:
     """How the cases ended.
 
-    counts: outcome -> cases; reasons: why cases have no result; failures: the first of those with an error
+    counts: ending -> cases; reasons: why cases have no row, by ending; failures: the first of those without one
+    lost: why proofs were tried and not found, by proof
     marks: a row's status other than ok -> cases; cycles, strategies: those planned
     contradictions: cases whose objective is below their own bound
     """
 
-    counts: Counter[str] = field(default_factory=Counter)
+    counts: Counter[Ending] = field(default_factory=Counter)
     reasons: Reasons = field(default_factory=Reasons)
+    lost: Reasons = field(default_factory=Reasons)
     failures: list[Record] = field(default_factory=list)
     marks: Counter[Status] = field(default_factory=Counter)
     cycles: dict[str, None] = field(default_factory=dict)
@@ -199,13 +201,17 @@ def _count(tally: Tally, record: Record) -> None:
     tally.cycles[record.cycle] = None
     if record.strategy != BOUND:
         tally.strategies[record.strategy] = None
-    tally.counts[record.outcome] += 1
-    if record.error is not None:
-        tally.reasons.add(record.outcome, record.error, record.design)
+    tally.counts[record.ending] += 1
+    if record.failure is not None:
+        tally.reasons.add(record.ending, record.failure.headline, record.design)
         if len(tally.failures) < FAILURES_LISTED:
             tally.failures.append(record)
-    if record.row is not None and not (status := Status.read(record.row["status"])).ok:
+    if record.row is None:
+        return
+    if not (status := Status.read(record.row["status"])).ok:
         tally.marks[status] += 1
+    for kind, why in (record.row.get("lost_proofs") or {}).items():
+        tally.lost.add(kind, why, record.design)
 
 
 def _solved(row: Mapping[str, Any]) -> Solved:

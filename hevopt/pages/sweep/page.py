@@ -11,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from hevopt.files.lookup import places_shown
+from hevopt.files.shown import printable
 from hevopt.pages.render import render
 from hevopt.pages.sweep.alerts import alerts
 from hevopt.pages.sweep.data import CASES_MAX, DESIGNS_MAX, Figures, Sweep, designs_csv
@@ -27,9 +28,8 @@ from hevopt.pages.sweep.drawing import (
 from hevopt.pages.sweep.effects import Effect, effect, is_log, is_numeric
 from hevopt.pages.sweep.verdict import Group, groups_of, shown_value, verdict
 from hevopt.studies.provenance import code_digest, versions
-from hevopt.sweeps.plan.jobs import NOX_WEIGHT
+from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
 from hevopt.sweeps.store.reading import Record
-from hevopt.sweeps.store.reasons import first_line
 
 PRUNED_LISTED = 100
 # Entries of the store's meta that have a place of their own on the page.
@@ -68,7 +68,7 @@ def sweep_page(sweep: Sweep) -> str:
         plane_words=words,
         pruned=_pruned(sweep),
         failures=[_failure(sweep, record) for record in sweep.tally.failures],
-        failures_all=sweep.tally.counts["failed"] + sweep.tally.counts["infeasible"],
+        failures_all=sum(sweep.tally.counts[ending] for ending in (Ending.FAILED, Ending.INFEASIBLE)),
         limits={"best": BEST_LISTED, "pruned": PRUNED_LISTED, "cases": CASES_MAX, "designs": DESIGNS_MAX,
                 "lines": LINES_MAX, "best_lines": BEST_LINES, "effects": EFFECTS_DRAWN},
         facts=_facts(sweep),
@@ -160,16 +160,15 @@ def _pruned(sweep: Sweep) -> list[dict[str, Any]]:
 
 def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
     parameters = {k: v for k, v in record.parameters.items() if k != NOX_WEIGHT}
-    error = record.error or ""
     return {
         "design": record.design,
         "weight": record.nox_weight,
         "parameters": ", ".join(f"{key} {shown_value(v)}" for key, v in parameters.items()),
         "cycle": record.cycle,
         "strategy": record.strategy,
-        "outcome": record.outcome,
-        "error": first_line(error),
-        "details": "\n".join(error.splitlines()[1:]),
+        "outcome": str(record.ending),
+        "error": printable(record.failure.headline),
+        "details": record.failure.details,
     }
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.pages.sweep.data import Figures, Scalar, Sweep
-from hevopt.sweeps.plan.jobs import NOX_WEIGHT
+from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
 
 # More weights than this are not compared one by one.
 GROUPS_MAX = 20
@@ -68,11 +68,8 @@ def verdict(sweep: Sweep, groups: Sequence[Group]) -> list[str]:
             for label, n in firsts
         ]
         parts.append(f"at the weights between, the best are {', '.join(named)}")
-    outcomes = (
-        ("ok", "done"),
-        *((name, name) for name in ("failed", "infeasible", "missing", "pruned")),
-    )
-    ended = ", ".join(f"{counts[name]} {word}" for name, word in outcomes)
+    order = (Ending.OK, Ending.FAILED, Ending.INFEASIBLE, Ending.MISSING, Ending.PRUNED)
+    ended = ", ".join(f"{counts[e]} {'done' if e is Ending.OK else e}" for e in order)
     designs = len(figures.number)
     best = "; ".join(parts) if parts else "no design is solved"
     return [

@@ -5,12 +5,14 @@ A job is one car on one cycle: its control table is built once for all strategie
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle, load_cycle, shipped_cycles
+from hevopt.errors import HevoptError
 from hevopt.studies.provenance import cycle_contents, digest, physics_digest, versions
 
 NOX_WEIGHT = "nox_weight"
@@ -43,19 +45,51 @@ class Job:
     inputs: str | None = None
 
 
+class Ending(StrEnum):
+    """How a planned case stands: with a row, without one for a reason of its own, or not solved."""
+
+    OK = "ok"
+    INFEASIBLE = "infeasible"  # proven or found impossible
+    FAILED = "failed"
+    PRUNED = "pruned"
+    MISSING = "missing"
+
+
+SOLVED = (Ending.OK, Ending.INFEASIBLE, Ending.FAILED)
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """Why a case has no row. headline: in one line; details: what it lists, line by line, or ''."""
+
+    headline: str
+    details: str = ""
+
+    @classmethod
+    def of(cls, error: BaseException) -> "Failure":
+        """What an exception says; one that hevopt does not raise on purpose is named."""
+        said = str(error) if isinstance(error, HevoptError) else f"{type(error).__name__}: {error}"
+        first, *others = said.splitlines() or ["no reason given"]
+        return cls(first.rstrip(":"), "\n".join(others))
+
+    def __str__(self) -> str:
+        return f"{self.headline}:\n{self.details}" if self.details else self.headline
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a case. status: "ok", "infeasible" (proven or found impossible) or "failed", with the error.
+    """What came of a case. ending: one of SOLVED; failure: of one that has no row.
 
     row: the fields of rows.Row but solve_s; `objective_l_per_100km`: charge-corrected fuel + weighted NOx;
-    `objective_bound_l_per_100km`: what no plan with at least that row's end charge can undercut
+    `objective_bound_l_per_100km`: what no plan with at least that row's end charge can undercut;
+    `lost_proofs`: where there are any, proof -> why it was tried and not found
     seconds: time it took, the table and the dynamic program going to the first case that needed them
     """
 
     key: str
-    status: str
+    ending: Ending
     row: Mapping[str, Any] | None
-    error: str | None
+    failure: Failure | None
     seconds: float
 
 

@@ -5,8 +5,9 @@ from pathlib import Path
 from hevopt.errors import DataError
 from hevopt.files.frames import csv_of, parquet_of
 from hevopt.files.writing import check_writable, write_whole
+from hevopt.sweeps.plan.jobs import Ending
 from hevopt.sweeps.store.frames import frames_of
-from hevopt.sweeps.store.reading import OUTCOMES, Reader
+from hevopt.sweeps.store.reading import Reader
 
 
 def check_export(path: Path) -> None:
@@ -32,7 +33,7 @@ def export(reader: Reader, path: Path) -> int:
     check_export(path)
     write_whole(path, cases_csv(reader) if path.suffix == ".csv" else parquet_of(frames_of(reader)))
     counts = reader.counts()
-    return sum(counts[outcome] for outcome in OUTCOMES)
+    return sum(counts[ending] for ending in Ending)
 
 
 def cases_csv(reader: Reader) -> bytes:

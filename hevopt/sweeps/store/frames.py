@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hevopt.files.frames import TYPES
 from hevopt.studies.frames import kinds_of_rows
-from hevopt.sweeps.plan.jobs import BOUND, FIGURES, NOX_WEIGHT
+from hevopt.sweeps.plan.jobs import BOUND, FIGURES, NOX_WEIGHT, Ending
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store.reading import Reader, open_to_read
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _LEADING = ("design", "cycle", "strategy", "outcome")
 _PRUNED = ("design_bound_l_per_100km", "incumbent", "incumbent_objective_l_per_100km")
-_LAST = ("error", "case_s")
+_LOST, _LAST = "lost_proofs", ("error", "case_s")
 # Of a row: the strategy is told before, and a sweep has no reference for changes.
 _LEFT_OUT = ("strategy", "delta_fuel_percent", "delta_nox_percent")
 # Lines of one of the tables that a store is read in, so that memory holds few of them as Python's objects.
@@ -29,8 +29,9 @@ def read_sweep(path: str | Path) -> "pd.DataFrame":
 
     outcome: "ok", "infeasible", "failed", "pruned" or "missing". Every parameter is a column under its key path;
     figures have their units in their names, and are missing where a case has none. Cases of pruned designs have
-    their bound, that of the design (mean over the cycles), and the incumbent that condemned it. case_s: seconds of
-    the whole case, the control table and the dynamic program going to the first one that needed them.
+    their bound, that of the design (mean over the cycles), and the incumbent that condemned it. lost_proofs: where
+    there are any, proofs that were tried and not found. case_s: seconds of the whole case, the control table and
+    the dynamic program going to the first one that needed them.
     Raises DataError where the file is no store, or damaged.
     """
     import pandas as pd
@@ -67,8 +68,7 @@ def _kinds(reader: Reader) -> dict[str, type]:
     for line in _lines(reader):
         for name, value in line.items():
             found.setdefault(name, set()).add(type(value))
-    pruned = [name for name in _PRUNED if name in found]
-    last = [*pruned, *_LAST]
+    last = [*(name for name in (*_PRUNED, _LOST) if name in found), *_LAST]
     ordered = [name for name in found if name not in last] + last
     known = _known_kinds()
     kinds = {name: _kind_of(found.get(name, set()) - {type(None)}) for name in ordered}
@@ -93,13 +93,16 @@ def _lines(reader: Reader) -> Iterator[dict[str, Any]]:
         records = list(found)
         bound = next((r.row for r in records if r.strategy == BOUND and r.row is not None), {})
         for record in records:
-            line = {name: getattr(record, name) for name in _LEADING}
-            line |= record.parameters
+            leading = design, record.cycle, record.strategy, str(record.ending)
+            line = dict(zip(_LEADING, leading, strict=True)) | record.parameters
             line[NOX_WEIGHT] = record.nox_weight
-            pruned = record.outcome == "pruned"
+            pruned = record.ending == Ending.PRUNED
             row = _unsolved(bound, condemned[design]) if pruned else record.row or {}
             line |= {k: v for k, v in row.items() if k not in _LEFT_OUT}
-            yield line | {"error": record.error, "case_s": record.seconds}
+            if lost := row.get(_LOST):
+                line[_LOST] = "; ".join(f"{kind}: {why}" for kind, why in lost.items())
+            failure = record.failure and str(record.failure)
+            yield line | {"error": failure, "case_s": record.seconds}
 
 
 def _unsolved(bound: Mapping[str, Any], pruned: Pruned) -> dict[str, Any]:

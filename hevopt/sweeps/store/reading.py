@@ -13,11 +13,11 @@ from typing import Any
 from hevopt.errors import DataError
 from hevopt.files.lookup import check_regular, places_shown, without_folders
 from hevopt.files.writing import temporary_folder
+from hevopt.sweeps.plan.jobs import Ending, Failure
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store.limits import check_side_files, contents_faults, set_limits
 from hevopt.sweeps.store.store import check_kind, told
 from hevopt.sweeps.store.stored import (
-    OUTCOMES,
     check_case,
     check_meta,
     check_pruned,
@@ -28,8 +28,8 @@ from hevopt.sweeps.store.stored import (
 
 _RECORDS = """
 SELECT plan.design, designs.parameters, plan.cycle, plan.strategy, plan.nox_weight,
-       CASE WHEN cases.status IS NOT NULL THEN cases.status WHEN pruned.design IS NOT NULL THEN 'pruned'
-            ELSE 'missing' END AS outcome, cases.row, cases.error, cases.seconds
+       CASE WHEN cases.ending IS NOT NULL THEN cases.ending WHEN pruned.design IS NOT NULL THEN 'pruned'
+            ELSE 'missing' END AS ending, cases.row, cases.failure, cases.seconds
 FROM plan JOIN designs ON designs.number = plan.design LEFT JOIN cases ON cases.key = plan.key
 LEFT JOIN pruned ON pruned.design = plan.design
 """
@@ -43,16 +43,16 @@ WHERE type = 'text' AND value LIKE '/%' AND length(value) < 5000
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A case of a design. outcome: one of OUTCOMES; row: as jobs.Outcome has it; seconds: it took."""
+    """A case of a design. row: as jobs.Outcome has it; seconds: it took."""
 
     design: int
     parameters: Mapping[str, Any]
     cycle: str
     strategy: str
     nox_weight: float
-    outcome: str
+    ending: Ending
     row: Mapping[str, Any] | None
-    error: str | None
+    failure: Failure | None
     seconds: float | None
 
 
@@ -79,16 +79,16 @@ class Reader:
         check_meta(self.path, meta)
         return meta
 
-    def statuses(self) -> dict[str, str]:
-        """Key -> status of all cases that have a result."""
+    def endings(self) -> dict[str, str]:
+        """Key -> ending of all cases that have a result."""
         with told(self.path):
-            return dict(self.connection.execute("SELECT key, status FROM cases"))
+            return dict(self.connection.execute("SELECT key, ending FROM cases"))
 
     def counts(self) -> dict[str, int]:
-        """Cases of the plan by outcome; `designs`; `other`: results of other plans or other code."""
-        query = f"SELECT outcome, count(*) FROM ({_RECORDS}) GROUP BY outcome"
+        """Cases of the plan by ending; `designs`; `other`: results of other plans or other code."""
+        query = f"SELECT ending, count(*) FROM ({_RECORDS}) GROUP BY ending"
         with told(self.path):
-            counts = dict.fromkeys(OUTCOMES, 0) | dict(self.connection.execute(query))
+            counts = dict.fromkeys(map(str, Ending), 0) | dict(self.connection.execute(query))
             for name, query in (
                 ("designs", "SELECT count(*) FROM designs"),
                 ("other", "SELECT count(*) FROM cases WHERE key NOT IN (SELECT key FROM plan)"),
@@ -104,7 +104,7 @@ class Reader:
             keys = None
             for found in self.connection.execute(query):
                 values = dict(zip(names, found, strict=True))
-                for name in ("parameters", "row"):
+                for name in ("parameters", "row", "failure"):
                     values[name] = loaded(self.path, values[name])
                 check_case(self.path, values, keys)
                 keys = values["parameters"]
@@ -115,12 +115,14 @@ class Reader:
             key: self.names.get(value, value) if isinstance(value, str) else value
             for key, value in values["parameters"].items()
         }
-        error = values["error"]
+        failure = values["failure"]
         shown = {
             "parameters": parameters,
             "cycle": self.names.get(values["cycle"], values["cycle"]),
             "row": known_figures(values["row"]),
-            "error": None if error is None else without_folders(error),
+            "ending": Ending(values["ending"]),
+            "failure": failure
+            and Failure(**{name: without_folders(text) for name, text in failure.items()}),
         }
         return Record(**values | shown)
 

@@ -4,7 +4,7 @@
                                    command, when it was made and last run
     designs  number, parameters    of the study as last run: key path -> value, as JSON
     plan     design, cycle, strategy, nox_weight, key     which case answers for which design
-    cases    key, status, row, error, seconds             every result ever stored, by the digest of its inputs
+    cases    key, ending, row, failure, seconds           every result ever stored, by the digest of its inputs
     pruned   design, bound, incumbent, objective          designs discarded, and by what
 
 Results are added in transactions half a second or 200 rows apart, and reach the disk with each (WAL, FULL: twice a
@@ -17,7 +17,7 @@ import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import astuple
+from dataclasses import asdict, astuple
 from datetime import UTC, datetime
 from pathlib import Path
 from time import monotonic
@@ -31,7 +31,7 @@ from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store.limits import check_side_files, schema_faults
 from hevopt.sweeps.store.stored import damaged, loaded
 
-SCHEMA = 1
+SCHEMA = 2
 # "hevs": tells a store from other programs' SQLite files.
 APPLICATION = 0x68657673
 _COMMIT_S, _COMMIT_ROWS = 0.5, 200
@@ -41,14 +41,14 @@ CREATE TABLE designs (number INTEGER PRIMARY KEY, parameters TEXT NOT NULL);
 CREATE TABLE plan (design INTEGER NOT NULL, cycle TEXT NOT NULL, strategy TEXT NOT NULL, nox_weight REAL NOT NULL,
                    key TEXT NOT NULL, PRIMARY KEY (design, cycle, strategy)) WITHOUT ROWID;
 CREATE INDEX plan_key ON plan (key);
-CREATE TABLE cases (key TEXT PRIMARY KEY, status TEXT NOT NULL, row TEXT, error TEXT, seconds REAL NOT NULL);
+CREATE TABLE cases (key TEXT PRIMARY KEY, ending TEXT NOT NULL, row TEXT, failure TEXT, seconds REAL NOT NULL);
 CREATE TABLE pruned (design INTEGER PRIMARY KEY, bound REAL NOT NULL, incumbent INTEGER NOT NULL,
                      objective REAL NOT NULL);
 """
 _ADD = """
 INSERT INTO cases VALUES (?, ?, ?, ?, ?) ON CONFLICT (key) DO UPDATE
-SET status = excluded.status, row = excluded.row, error = excluded.error, seconds = excluded.seconds
-WHERE cases.status = 'failed'
+SET ending = excluded.ending, row = excluded.row, failure = excluded.failure, seconds = excluded.seconds
+WHERE cases.ending = 'failed'
 """
 
 
@@ -116,8 +116,10 @@ class Store:
             if not self._waiting:
                 self._since_s = monotonic()
             row = None if o.row is None else json.dumps(o.row, allow_nan=False)
-            error = None if o.error is None else encodable(o.error)
-            self._waiting.append((o.key, o.status, row, error, o.seconds))
+            failure = o.failure and json.dumps(
+                {name: encodable(text) for name, text in asdict(o.failure).items()}
+            )
+            self._waiting.append((o.key, str(o.ending), row, failure, o.seconds))
         due = len(self._waiting) >= _COMMIT_ROWS or monotonic() - self._since_s >= _COMMIT_S
         if self._waiting and due:
             self.commit()
@@ -136,9 +138,9 @@ class Store:
                 "INSERT OR REPLACE INTO pruned VALUES (?, ?, ?, ?)", map(astuple, pruned)
             )
 
-    def statuses(self) -> dict[str, str]:
-        """Key -> status of the planned cases that have a result."""
-        query = "SELECT key, status FROM cases WHERE key IN (SELECT key FROM plan)"
+    def endings(self) -> dict[str, str]:
+        """Key -> ending of the planned cases that have a result."""
+        query = "SELECT key, ending FROM cases WHERE key IN (SELECT key FROM plan)"
         with told(self.path):
             return dict(self._connection.execute(query))
 

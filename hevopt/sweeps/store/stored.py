@@ -14,9 +14,8 @@ from hevopt.errors import DataError
 from hevopt.files.lookup import loaded_json
 from hevopt.studies.rows import Row
 from hevopt.studies.status import Status
-from hevopt.sweeps.plan.jobs import BOUND
+from hevopt.sweeps.plan.jobs import BOUND, SOLVED, Ending
 
-OUTCOMES = ("ok", "infeasible", "failed", "pruned", "missing")
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 # Far beyond any figure, and far from where sums and squares of floats end.
 _FIGURE_MAX, _NUMBER_MAX, _WEIGHT_MAX = 1e100, 1e15, 1e6
@@ -69,6 +68,12 @@ class _StoredRow(_AnyRow):
     bound_l_per_100km: _Figure
     objective_l_per_100km: _Figure | None
     objective_bound_l_per_100km: _Figure
+    lost_proofs: Annotated[dict[_Name, str], Field(max_length=_KEYS_MAX)] | None = None
+
+
+class _StoredFailure(_Fields):
+    headline: str
+    details: str
 
 
 class _StoredCase(_Fields):
@@ -77,20 +82,20 @@ class _StoredCase(_Fields):
     cycle: _Name
     strategy: _Name
     nox_weight: Annotated[float, Field(ge=0, le=_WEIGHT_MAX)]
-    outcome: Literal[OUTCOMES]
+    ending: Literal[tuple(map(str, Ending))]
     row: _StoredRow | None
-    error: str | None
+    failure: _StoredFailure | None
     seconds: Annotated[float, Field(ge=0, le=_NUMBER_MAX)] | None
 
     @model_validator(mode="after")
     def _consistent(self):
-        stored = self.outcome not in ("pruned", "missing")
+        stored = self.ending in SOLVED
         if (self.seconds is not None) != stored:
-            raise ValueError(f"a case cannot be stored as {self.outcome}")
-        if (self.row is not None) != (self.outcome == "ok"):
+            raise ValueError(f"a case cannot be stored as {self.ending}")
+        if (self.row is not None) != (self.ending == Ending.OK):
             raise ValueError("a row belongs to each case that is ok, and to no other")
-        if (self.error is not None) != (stored and self.outcome != "ok"):
-            raise ValueError("an error belongs to each case that failed, and to no other")
+        if (self.failure is not None) != (stored and self.ending != Ending.OK):
+            raise ValueError("a failure belongs to each case that has no row, and to no other")
         if (
             self.row is not None
             and self.strategy != BOUND

@@ -19,8 +19,8 @@ from typing import Any
 from loky.backend import resource_tracker as loky_tracker
 
 from hevopt.errors import HevoptError
+from hevopt.files.shown import first_line
 from hevopt.sweeps.plan.jobs import Job, Outcome
-from hevopt.sweeps.store.reasons import first_line
 from hevopt.sweeps.workers.child import KEPT, Terms
 from hevopt.sweeps.workers.pools import Pool, open_pool
 from hevopt.sweeps.workers.supervisor import run_task
@@ -188,7 +188,7 @@ class _Team:
             if isinstance(fault, HevoptError) and not self._losses:
                 raise fault
             none = "and no other could" if self._losses else "no worker can"
-            raise WorkersLost(f"{self._loss}{none} be started: {_said(fault)}")
+            raise WorkersLost(f"{self._loss}{none} be started: {first_line(fault)}")
         _hear_signals()
         return opened.result()
 
@@ -207,7 +207,7 @@ class _Team:
         return answer
 
     def _lost(self, fault: BaseException) -> None:
-        text = _said(fault)
+        text = first_line(fault)
         self._losses += 1
         if self._losses > _LOSSES_MAX:
             raise WorkersLost(
@@ -251,7 +251,3 @@ def _fault_of(future: Future) -> BaseException | None:
         return future.exception()
     except CancelledError as error:
         return error
-
-
-def _said(fault: BaseException) -> str:
-    return first_line(str(fault) or type(fault).__name__)

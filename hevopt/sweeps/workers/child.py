@@ -20,7 +20,7 @@ from typing import Any
 
 from hevopt.errors import SolverError
 from hevopt.studies.provenance import code_digest
-from hevopt.sweeps.plan.jobs import Job, Outcome
+from hevopt.sweeps.plan.jobs import SOLVED, Ending, Failure, Job, Outcome
 
 READY, REFUSED, CASE, OUTCOME, DONE = "ready", "refused", "case", "outcome", "done"
 # For whatever ends a sweep before its end.
@@ -133,20 +133,21 @@ class _Bench:
         left, began = {case.key: case for case in job.cases}, perf_counter()
         self._next = iter(tuple(left))
         self._late.clear()
-        fault = "the worker gave no outcome for this case"
+        failure = Failure("the worker gave no outcome for this case")
         try:
             for outcome in self._work(job, self._guard):
                 if left.pop(outcome.key, None) is not None:
                     self._send(outcome)
         except BaseException as error:
-            fault = f"{type(error).__name__}: {error}"
+            failure = Failure.of(error)
         for key in left:
-            self._send(Outcome(key, "failed", None, fault, perf_counter() - began))
+            self._send(Outcome(key, Ending.FAILED, None, failure, perf_counter() - began))
 
     def _send(self, outcome: Outcome) -> None:
         # Whatever the case made of the exception that was to stop it.
         if outcome.key in self._late:
-            outcome = replace(outcome, status="failed", row=None, error=late(self._terms.timeout_s))
+            failure = Failure(late(self._terms.timeout_s))
+            outcome = replace(outcome, ending=Ending.FAILED, row=None, failure=failure)
         self._pipe.send((OUTCOME, _storable(outcome)))
 
     @contextmanager
@@ -177,16 +178,14 @@ def late(timeout_s: float | None) -> str:
 
 
 def _storable(outcome: Outcome) -> Outcome:
-    key, fault = outcome.key, outcome.error
-    if outcome.status in ("ok", "infeasible", "failed"):
-        try:
-            json.dumps(outcome.row, allow_nan=False)
-            return Outcome(key, outcome.status, outcome.row, fault, outcome.seconds)
-        except (TypeError, ValueError, RecursionError) as error:
-            fault = f"the row cannot be stored: {error}"
-    else:
-        fault = f"unknown status {outcome.status!r}"
-    return Outcome(key, "failed", None, fault, outcome.seconds)
+    try:
+        if outcome.ending not in SOLVED:
+            raise ValueError(f"a case cannot end as {outcome.ending!r}")
+        json.dumps(outcome.row, allow_nan=False)
+        return outcome
+    except (TypeError, ValueError, RecursionError) as error:
+        failure = Failure(f"the row cannot be stored: {error}")
+        return Outcome(outcome.key, Ending.FAILED, None, failure, outcome.seconds)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.errors import DataError
-from hevopt.files.shown import shown
-from hevopt.sweeps.store.reasons import first_line
+from hevopt.files.shown import first_line, shown
 from hevopt.sweeps.workers.supervisor import ONE_THREAD, end_with, python_path
 
 BACKENDS = ("loky", "dask", "ray")
@@ -122,7 +121,7 @@ def _dask(workers: int | None, scheduler: str | None) -> Pool:
     except Exception as error:
         for opened in filter(None, (client, cluster)):
             opened.close()
-        raise DataError(no_answer("dask", scheduler, _said(error))) from None
+        raise DataError(no_answer("dask", scheduler, first_line(error))) from None
 
     count = sum(client.nthreads().values())
     limited = min(workers or count, count)
@@ -169,7 +168,7 @@ def _ray(workers: int | None, scheduler: str | None) -> Pool:
         )  # fmt: skip
         count = int(ray.cluster_resources().get("CPU", 0))
     except Exception as error:
-        raise DataError(no_answer("ray", scheduler, _said(error))) from None
+        raise DataError(no_answer("ray", scheduler, first_line(error))) from None
     if not count:
         ray.shutdown()
         raise DataError(no_answer("ray", scheduler, "the cluster has no CPU"))
@@ -187,10 +186,6 @@ def _called(call: Callable[[], Any]) -> Any:
 
 
 OPENED = {"loky": _loky, "dask": _dask, "ray": _ray}
-
-
-def _said(error: Exception) -> str:
-    return first_line(str(error) or type(error).__name__)
 
 
 def no_answer(backend: str, scheduler: str | None, why: str) -> str:

@@ -18,7 +18,7 @@ from time import monotonic, sleep
 from typing import IO, NamedTuple
 from weakref import finalize
 
-from hevopt.sweeps.plan.jobs import Job, Outcome
+from hevopt.sweeps.plan.jobs import Ending, Failure, Job, Outcome
 from hevopt.sweeps.workers.child import CASE, OUTCOME, READY, REFUSED, CannotStart, Terms, late
 
 ONE_THREAD = dict.fromkeys(
@@ -58,7 +58,7 @@ def _outcomes(job: Job, terms: Terms) -> list[Outcome]:
             break
         if ended.late or key in suspects:
             fault = ended.fault if ended.late else f"{ended.fault}, twice"
-            found[key] = Outcome(key, "failed", None, fault, monotonic() - began)
+            found[key] = Outcome(key, Ending.FAILED, None, Failure(fault), monotonic() - began)
         suspects.add(key)
     return list(found.values())
 

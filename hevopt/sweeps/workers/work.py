@@ -13,7 +13,7 @@ from hevopt.bounds.prices import one_price_dual
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle, load_cycle
-from hevopt.errors import DataError, HevoptError, InfeasibleError, SolverError
+from hevopt.errors import DataError, InfeasibleError, SolverError
 from hevopt.files.lookup import find
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
@@ -22,7 +22,16 @@ from hevopt.studies.case import dp_case, require_nox
 from hevopt.studies.rows import Row, shortfall_steps
 from hevopt.studies.solved import run_case
 from hevopt.studies.status import Status
-from hevopt.sweeps.plan.jobs import BOUND, FIGURES, Case, Job, Outcome, inputs_digest
+from hevopt.sweeps.plan.jobs import (
+    BOUND,
+    FIGURES,
+    Case,
+    Ending,
+    Failure,
+    Job,
+    Outcome,
+    inputs_digest,
+)
 from hevopt.units import litres_per_100km
 
 # Proofs that cost more than a design's solution are tried only above this gap, four times that of a comparison.
@@ -39,17 +48,15 @@ def run_job(
     bench = _Bench(job)
     for case in job.cases:
         began = perf_counter()
-        status, row, error = "ok", None, None
+        ending, row, failure = Ending.OK, None, None
         try:
             with guard():
                 row = bench.row(case)
-        except InfeasibleError as found:
-            status, error = "infeasible", str(found)
-        except HevoptError as found:
-            status, error = "failed", str(found)
-        except Exception as found:
-            status, error = "failed", f"{type(found).__name__}: {found}"
-        yield Outcome(case.key, status, row, error, perf_counter() - began)
+        except InfeasibleError as error:
+            ending, failure = Ending.INFEASIBLE, Failure.of(error)
+        except Exception as error:
+            ending, failure = Ending.FAILED, Failure.of(error)
+        yield Outcome(case.key, ending, row, failure, perf_counter() - began)
 
 
 class _Bench:
@@ -107,7 +114,10 @@ def _strategy_row(solved: SolvedCase, strategy: str) -> dict[str, Any]:
         _litres(solved.car, solved.cycle, mass_kg - worth_kg)
         for mass_kg in (trajectory.cost_kg, bound_kg)
     )
-    return _stored(row, objective, bound)
+    stored, lost = _stored(row, objective, bound), solved.certificate.failures
+    return (
+        stored | {"lost_proofs": {str(kind): why for kind, why in lost.items()}} if lost else stored
+    )
 
 
 def _stored(row: Row, objective: float | None, bound: float | None) -> dict[str, Any]:

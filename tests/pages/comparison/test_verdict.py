@@ -96,6 +96,7 @@ def test_every_kind_of_alert_names_its_row(nedc):
         contents["cars"]["B"]["missing_torque_nm"][7:9] = [12.0, 30.0]
         figures(contents, "D", "ecms").update(status="not neutral", delta_energy_percent=-1.5)
         contents["cars"]["E"]["certified_gap_percent"] = 0.31
+        contents["lost_proofs"] = {"C2, LP prices": "HiGHS stopped"}
         contents["failures"]["C1 mpc"] = "no plan\n  at step 3"
         contents["rows"][5]["detail"]["solver"] = ["4 previews solved by the second solver"]
 
@@ -108,6 +109,7 @@ def test_every_kind_of_alert_names_its_row(nedc):
     assert "D ecms" in found["Charge balance"].lines[0]
     assert "−1.50 %" in found["Charge balance"].lines[0]
     assert "E: dynamic programming lies 0.31 %" in found["Certificates"].lines[0]
+    assert found["Certificates"].lines[1] == "C2, LP prices: tried and not found: HiGHS stopped."
     assert (
         found["Solvers"].lines[0] == "C1 mpc: no plan" and "previews" in found["Solvers"].lines[2]
     )

@@ -12,7 +12,10 @@ from small_stores import DESIGNS, PLAN, ok, row
 from sweep_runs import check_sound
 
 from hevopt.errors import DataError, HevoptError
-from hevopt.sweeps.plan.jobs import Outcome
+from hevopt.pages.sweep.alerts import alerts
+from hevopt.pages.sweep.data import load_sweep
+from hevopt.pages.sweep.verdict import groups_of
+from hevopt.sweeps.plan.jobs import Failure, Outcome
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store import store as store_module
 from hevopt.sweeps.store.lock import locked
@@ -33,22 +36,55 @@ def records(path):
 
 
 def test_what_is_stored_is_read_to_the_last_bit_in_the_order_of_designs(tmp_path):
-    failed = Outcome("1dp", "failed", None, "no; 'quoted'\n", 2.0)
-    infeasible = Outcome("1ecms", "infeasible", None, "never", 1.0)
+    failed = Outcome("1dp", "failed", None, Failure("no; 'quoted'\n"), 2.0)
+    infeasible = Outcome("1ecms", "infeasible", None, Failure("never"), 1.0)
     path = filled(tmp_path / "s.sqlite", [failed, ok("0ecms", 0.1 + 0.2), infeasible])
     found = records(path)
-    assert [(r.design, r.strategy, r.outcome) for r in found] == [
+    assert [(r.design, r.strategy, r.ending) for r in found] == [
         (0, "dp", "missing"), (0, "ecms", "ok"), (1, "dp", "failed"), (1, "ecms", "infeasible"),
     ]  # fmt: skip
     assert found[1].row == row(0.1 + 0.2, "ecms")
-    assert found[2].error == "no; 'quoted'\n" and found[2].seconds == 2.0
+    assert str(found[2].failure) == "no; 'quoted'\n" and found[2].seconds == 2.0
     assert found[0].parameters == {"a": 0.1, "nox_weight": 0}
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_failure_is_read_as_it_was_made_and_a_lost_proof_is_in_every_view(tmp_path, hevopt):
+    path = tmp_path / "s.sqlite"
+    why = Failure.of(DataError("cycle cannot be followed:\n  t = 3 s\nchoose another"))
+    lost = {"lost_proofs": {"LP prices": "HiGHS stopped with status 4"}}
+    fine = ok("0dp")
+    solved = Outcome(fine.key, fine.ending, fine.row | lost, None, 0.5)
+    filled(path, [solved, Outcome("1dp", "failed", None, why, 1.0)])
+    found = {(r.design, r.strategy): r for r in records(path)}
+    assert found[1, "dp"].failure == why
+    assert (why.headline, why.details) == (
+        "cycle cannot be followed", "  t = 3 s\nchoose another",
+    )  # fmt: skip
+    assert found[0, "dp"].row["lost_proofs"] == lost["lost_proofs"]
+    said = hevopt("sweep", "--status", "s.sqlite").out
+    assert "failed once in design 1: cycle cannot be followed\n" in said
+    assert "LP prices not found once in design 0: HiGHS stopped with status 4" in said
+    assert hevopt("sweep", "--store", "s.sqlite", "--export", "cases.csv").status == 0
+    written = (tmp_path / "cases.csv").read_text()
+    assert "LP prices: HiGHS stopped with status 4" in written
+    assert '"cycle cannot be followed:\n  t = 3 s\nchoose another"' in written
+    (checks,) = [a for a in page_alerts(path) if a.name == "Certificates"]
+    assert checks.found and any("HiGHS stopped" in line for line in checks.lines)
+
+
+def page_alerts(path):
+    sweep = load_sweep(path)
+    return alerts(sweep, groups_of(sweep.figures))
+
+
 def test_a_result_is_never_replaced_and_a_failure_is(tmp_path):
-    path = filled(tmp_path / "s.sqlite", [ok("0dp", 1.0), Outcome("1dp", "failed", None, "e", 0.0)])
-    filled(path, [ok("0dp", 2.0), ok("1dp", 3.0), Outcome("0dp", "failed", None, "late", 0.0)])
+    path = filled(
+        tmp_path / "s.sqlite", [ok("0dp", 1.0), Outcome("1dp", "failed", None, Failure("e"), 0.0)]
+    )
+    filled(
+        path, [ok("0dp", 2.0), ok("1dp", 3.0), Outcome("0dp", "failed", None, Failure("late"), 0.0)]
+    )
     found = {r.design: r for r in records(path) if r.strategy == "dp"}
     assert found[0].row["fuel_l_per_100km"] == 1.0 and found[1].row["fuel_l_per_100km"] == 3.0
     check_sound(path)
@@ -60,7 +96,7 @@ def test_a_result_is_on_disk_after_half_a_second_or_two_hundred_rows(tmp_path, m
 
     def on_disk():
         with open_to_read(path) as reader:
-            return len(reader.statuses())
+            return len(reader.endings())
 
     with open_store(path) as store:
         store.add([ok("a")])
@@ -86,7 +122,7 @@ def test_another_plan_keeps_the_results_of_the_former(tmp_path):
     with open_store(path) as store:
         store.prune([Pruned(1, 2.0, 0, 1.5)])
         store.begin({"study": "other"}, DESIGNS[:1], PLAN[-1:])
-        assert store.statuses() == {"0dp": "ok"} and store.others() == 1
+        assert store.endings() == {"0dp": "ok"} and store.others() == 1
     with open_to_read(path) as reader:
         assert reader.counts() == {
             "ok": 1, "infeasible": 0, "failed": 0, "pruned": 0, "missing": 0, "designs": 1, "other": 1,
@@ -98,7 +134,7 @@ def test_a_pruned_design_is_told_with_what_condemned_it_and_a_solved_case_is_not
     path = filled(tmp_path / "s.sqlite", [ok("1dp")])
     with open_store(path) as store:
         store.prune([Pruned(1, 2.0, 0, 1.5)])
-    assert [r.outcome for r in records(path)] == ["missing", "missing", "ok", "pruned"]
+    assert [r.ending for r in records(path)] == ["missing", "missing", "ok", "pruned"]
     with open_to_read(path) as reader:
         assert reader.pruned() == [Pruned(1, 2.0, 0, 1.5)]
 

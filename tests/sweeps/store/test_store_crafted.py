@@ -10,7 +10,7 @@ from small_stores import DESIGNS, PLAN, ok, row
 from hevopt.errors import DataError
 from hevopt.pages.sweep.data import load_sweep
 from hevopt.pages.sweep.page import sweep_page
-from hevopt.sweeps.plan.jobs import Outcome, Planned
+from hevopt.sweeps.plan.jobs import Failure, Outcome, Planned
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store import limits
 from hevopt.sweeps.store.export import cases_csv
@@ -19,7 +19,7 @@ from hevopt.sweeps.store.store import open_store
 
 COLUMNS = {
     "meta": "name, value", "designs": "number, parameters", "plan": "design, cycle, strategy, nox_weight, key",
-    "cases": "key, status, row, error, seconds", "pruned": "design, bound, incumbent, objective",
+    "cases": "key, ending, row, failure, seconds", "pruned": "design, bound, incumbent, objective",
 }  # fmt: skip
 ENDLESS = "WITH RECURSIVE endless(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM endless)"
 
@@ -30,7 +30,7 @@ def store(tmp_path):
     path = tmp_path / "s.sqlite"
     with open_store(path) as opened:
         opened.begin({"study": "text", "inputs": "{}", "versions": "{}"}, DESIGNS, PLAN)
-        opened.add([ok("0dp"), Outcome("0ecms", "failed", None, "no", 1.0)])
+        opened.add([ok("0dp"), Outcome("0ecms", "failed", None, Failure("no"), 1.0)])
         opened.prune([Pruned(1, 2.0, 0, 1.5)])
     return path
 
@@ -88,10 +88,10 @@ def test_other_tables_than_a_sweep_makes_are_damage(store, table, how):
         ("UPDATE plan SET nox_weight = 2 WHERE key = '0dp'", "two NOx weights"),
         ("UPDATE plan SET nox_weight = -1", "nox_weight"),
         ("UPDATE plan SET nox_weight = 9e999", "nox_weight"),
-        ("UPDATE cases SET status = 'pruned' WHERE key = '0dp'", "cannot be stored as pruned"),
-        ("UPDATE cases SET status = 'missing' WHERE key = '0dp'", "cannot be stored as missing"),
-        ("UPDATE cases SET status = 'failed' WHERE key = '0dp'", "row"),
-        ("UPDATE cases SET error = NULL", "error"),
+        ("UPDATE cases SET ending = 'pruned' WHERE key = '0dp'", "cannot be stored as pruned"),
+        ("UPDATE cases SET ending = 'missing' WHERE key = '0dp'", "cannot be stored as missing"),
+        ("UPDATE cases SET ending = 'failed' WHERE key = '0dp'", "row"),
+        ("UPDATE cases SET failure = NULL", "failure"),
         ("UPDATE cases SET row = replace(row, '0.3333333333333333', 'null')", "row"),
         ("UPDATE cases SET row = replace(row, '0.333', '1e200') WHERE row IS NOT NULL", "row"),
         ("UPDATE cases SET row = replace(row, '\"status\"', '\"soc_end\": \"x\", \"status\"')", "row.soc_end"),
@@ -99,7 +99,7 @@ def test_other_tables_than_a_sweep_makes_are_damage(store, table, how):
         ("UPDATE designs SET parameters = '{\"a\": 1' || printf('%.*c', 4000, '0') || '}'", "parameters.a"),
         ("UPDATE designs SET parameters = '{\"a\": NaN}'", "parameters.a"),
         ("UPDATE designs SET parameters = printf('%.*c', 100000, '[')", "JSON"),
-        ("UPDATE cases SET error = CAST(x'ff' AS TEXT) WHERE error IS NOT NULL", "decode"),
+        ("UPDATE cases SET failure = CAST(x'ff' AS TEXT) WHERE failure IS NOT NULL", "decode"),
         ("UPDATE meta SET value = 'null' WHERE name = 'versions'", "versions"),
         ("UPDATE meta SET value = '{\"a\": 1}' WHERE name = 'inputs'", "inputs"),
         ("UPDATE meta SET value = x'00' WHERE name = 'study'", "study"),
@@ -167,7 +167,9 @@ def test_files_are_named_without_folders_that_are_the_users(tmp_path):
     }  # fmt: skip
     with open_store(path) as opened:
         opened.begin(meta, designs, plan)
-        opened.add([ok("0dp"), Outcome("1dp", "failed", None, f"{folder}/short.csv: no", 1.0)])
+        opened.add(
+            [ok("0dp"), Outcome("1dp", "failed", None, Failure(f"{folder}/short.csv: no"), 1.0)]
+        )
     page = read_all(path)
     with open_to_read(path) as reader:
         table = cases_csv(reader).decode()

@@ -60,7 +60,7 @@ def test_a_backend_has_as_many_workers_as_asked_outside_this_process(
         again = by_key(outcome for outcomes in run(jobs[:2]) for outcome in outcomes)
     assert set(found) == {f"k{n}" for n in range(24)}
     for key, outcome in found.items():
-        assert outcome.status == "ok" and sweep_workers.row_of(key).items() <= outcome.row.items()
+        assert outcome.ending == "ok" and sweep_workers.row_of(key).items() <= outcome.row.items()
     pids = {o.row["pid"] for o in found.values() if "pid" in o.row}
     homes = {o.row["worker"] for o in found.values() if "pid" in o.row}
     assert len(pids) == len(homes) == count
@@ -86,7 +86,7 @@ def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_pat
     terms = Terms("sweep_workers:work", timeout_s=1.0, loading_s=0.0)
     found = by_key(outcomes_of(sweep_workers.jobs(20, 2, does), terms, count=2))
     assert set(found) == {f"k{n}" for n in range(40)}
-    errors = {int(key[1:]): o.error for key, o in found.items() if o.status == "failed"}
+    errors = {int(key[1:]): str(o.failure) for key, o in found.items() if o.ending == "failed"}
     assert set(errors) == set(does) - {30}
     expected = {
         1: "not today", 13: "signal 9.*twice", 17: "cannot be stored", 20: "cannot be stored", 25: "SystemExit",
@@ -101,7 +101,7 @@ def test_what_a_job_has_finished_is_not_run_again_when_its_process_ends(tmp_path
     does = {n: ["note", str(ran)] for n in range(12)} | {3: "die", 4: "hang in C", 9: "die"}
     terms = Terms("sweep_workers:work", timeout_s=1.0, loading_s=0.0)
     found = by_key(outcomes_of(sweep_workers.jobs(1, 12, does), terms, count=1))
-    failed = {int(key[1:]) for key, o in found.items() if o.status == "failed"}
+    failed = {int(key[1:]) for key, o in found.items() if o.ending == "failed"}
     assert len(found) == 12 and failed == {3, 4, 9}
     assert ran.read_text() == "ran\n" * 9
 
@@ -109,8 +109,8 @@ def test_what_a_job_has_finished_is_not_run_again_when_its_process_ends(tmp_path
 def test_a_case_that_eats_memory_is_its_own_failure():
     terms = Terms("sweep_workers:work", memory_mb=700)
     found = by_key(outcomes_of(sweep_workers.jobs(2, 2, {1: "eat"}), terms, count=1))
-    assert [found[f"k{n}"].status for n in range(4)] == ["ok", "failed", "ok", "ok"]
-    assert "MemoryError" in found["k1"].error
+    assert [found[f"k{n}"].ending for n in range(4)] == ["ok", "failed", "ok", "ok"]
+    assert "MemoryError" in found["k1"].failure.headline
 
 
 @contextmanager
@@ -154,8 +154,8 @@ def test_a_cluster_that_runs_already_gives_the_same_results_and_goes_on_running(
 @pytest.mark.parametrize(("work", "words"), [("raises", "all of it"), ("forgets", "no outcome")])
 def test_work_that_breaks_its_promise_gives_failures(work, words):
     found = by_key(outcomes_of(sweep_workers.jobs(1), Terms(f"sweep_workers:{work}"), count=1))
-    assert words in found["k0"].error
-    assert found["k1"].status == ("failed" if work == "raises" else "ok")
+    assert words in found["k0"].failure.headline
+    assert found["k1"].ending == ("failed" if work == "raises" else "ok")
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ def test_killed_workers_lose_nothing_and_double_nothing(backend):
     assert len(killed) == 2
     found = by_key(outcomes)
     assert set(found) == {f"k{n}" for n in range(40)}
-    assert {o.status for o in outcomes} == {"ok"}
+    assert {o.ending for o in outcomes} == {"ok"}
     assert bool(notices) == (backend == "loky") and all("run again" in text for text in notices)
 
 
@@ -263,13 +263,16 @@ def test_closed_early_the_workers_are_gone_and_what_came_is_kept():
         time.sleep(0.05)
 
 
-def test_the_caller_is_heard_while_nothing_comes():
+def test_the_caller_is_heard_while_nothing_comes(tmp_path):
     """Not only while the worker starts: between two outcomes as well."""
-    jobs = sweep_workers.jobs(3, 1, {1: "rest"})
+    heard, came = tmp_path / "heard", []
+    jobs = sweep_workers.jobs(3, 1, {1: ["await", str(heard)]})
     with workers(WORK, count=1) as run:
-        arrivals = list(run(jobs))
-    first, last = (n for n, found in enumerate(arrivals) if found and found[0].key in ("k0", "k1"))
-    assert [] in arrivals[first:last]
+        for found in run(jobs):
+            came += found
+            if came and not found:
+                heard.touch()
+    assert heard.exists() and [o.ending for o in came] == ["ok"] * 3
 
 
 def test_a_caller_that_stops_when_workers_end_is_not_told_of_a_loss():

@@ -23,7 +23,7 @@ def one_job(strategies=("ecms", "dp", "bound"), weights=(0.0, 10.0), **settings)
 
 def test_a_job_gives_the_rows_that_a_comparison_would():
     outcomes = list(run_job(one_job()[0]))
-    assert [o.status for o in outcomes] == ["ok"] * 6
+    assert [o.ending for o in outcomes] == ["ok"] * 6
     case = prepare(load_architecture("C2", CHANGES), load_cycle("nedc"), Settings(nox_weight=10.0))
     row, _, trajectory = run_case(case, "ecms")
     stored = next(o.row for o in outcomes[3:] if o.row["strategy"] == "ecms")
@@ -109,24 +109,24 @@ def test_an_exception_is_an_outcome_and_the_other_cases_go_on():
         def __exit__(self, *_):
             return False
 
-    assert {o.status for o in run_job(job)} == {"ok"}
+    assert {o.ending for o in run_job(job)} == {"ok"}
     guarded = run_job(job, Guard)
-    assert [(o.status, o.error) for o in guarded] == [("failed", "not today")] * 2
-    assert [o.status for o in run_job(broken)] == ["failed"] * 2
+    assert [(o.ending, str(o.failure)) for o in guarded] == [("failed", "not today")] * 2
+    assert [o.ending for o in run_job(broken)] == ["failed"] * 2
     weak = Job("A", {}, "us06", False, (Case("k", 0.0, "baseline"),))
     (outcome,) = run_job(weak)
-    assert outcome.status == "infeasible" and "Nm missing" in outcome.error
-    assert {o.status for o in run_job(impossible)} <= {"ok", "infeasible", "failed"}
+    assert outcome.ending == "infeasible" and "Nm missing" in str(outcome.failure)
+    assert {o.ending for o in run_job(impossible)} <= {"ok", "infeasible", "failed"}
 
 
 def test_a_file_that_changes_while_a_sweep_runs_fails_its_cases(tmp_path):
     cycle = tmp_path / "drive.csv"
     cycle.write_text("time_s,speed_kmh\n0,0\n10,36\n20,36\n30,0\n")
     ((job, _),) = jobs_of("C2", [str(cycle)], ["dp"], [({}, [(0, 0.0)])])
-    assert next(run_job(job)).status == "ok"
+    assert next(run_job(job)).ending == "ok"
     cycle.write_text("time_s,speed_kmh\n0,0\n10,40\n20,36\n30,0\n")
     (outcome,) = run_job(job)
-    assert outcome.status == "failed" and "changed after the sweep began" in outcome.error
+    assert outcome.ending == "failed" and "changed after the sweep began" in str(outcome.failure)
 
 
 def test_a_bound_says_where_the_cycle_is_not_followed():
