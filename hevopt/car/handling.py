@@ -1,0 +1,99 @@
+"""What shows only in a car that somebody drives: tyres, clutch and the change of gear. Equations of the study.
+
+Figures of a common compact car with a manual gearbox. Sources: the study names the forms of (2),
+(4) and (17), friction of 0.8 to 0.9 and lags of some tenths of a second; relaxation lengths of 0.04
+to above 0.3 m are published, mostly lateral; half a second to a second is a common manual change,
+above 0.625 s a slow one; a dry clutch's torque hardly depends on its slip (Myklebust and Eriksson,
+VPPC 2012). What no source gives is an estimate [E].
+"""
+
+from typing import NamedTuple
+
+from hevopt.errors import DataError
+from hevopt.units import STANDARD_GRAVITY_MPS2
+
+
+class Tyre(NamedTuple):
+    """The driven tyres, front wheels driven.
+
+    lag_s: of the force behind the torque, equation (2); 0 for none [E: relaxation length 0.3 m at 10 m/s]
+    friction: highest force over wheel load, equation (4)
+    driven_share: of the weight on the driven axle at rest [E]; height_share: height of the centre of mass over the
+    wheelbase [E]
+    stiffness, shape, curvature: B, C, E of Pacejka's magic formula, a common set for dry tarmac
+    relaxation_m: travel in which slip builds up [E]
+    """
+
+    lag_s: float = 0.03
+    friction: float = 0.85
+    driven_share: float = 0.60
+    height_share: float = 0.20
+    stiffness: float = 10.0
+    shape: float = 1.9
+    curvature: float = 0.97
+    relaxation_m: float = 0.25
+
+    @property
+    def grip_mps2(self) -> float:
+        """Highest acceleration that the driven axle holds on a level road, the load moved by it included."""
+        held = self.friction * self.driven_share * STANDARD_GRAVITY_MPS2
+        return held / (1 + self.friction * self.height_share)
+
+
+class Clutch(NamedTuple):
+    """A friction clutch, equations (16) and (17), for a slip s and a closing u from 0 to 1:
+
+        T = u sign(s) [slipping - (slipping - sticking) exp(-|s| / scale)]
+
+    slipping_nm, sticking_nm: highest torque at high slip s and at none [E: 1.45 x the engine's 290 Nm]
+    slip_scale_radps [E]; closing_s: from open to fully closed after a change [E]
+    """
+
+    slipping_nm: float = 420.0
+    sticking_nm: float = 380.0
+    slip_scale_radps: float = 20.0
+    closing_s: float = 0.15
+
+
+class Shifting(NamedTuple):
+    """How a gear is changed.
+
+    gap_s: without traction; 0 for a dual clutch gearbox, whose ratio moves under load
+    ratio_lag_s: first-order lag of the ratio, "some tenths of a second" to settle
+    between_s: least time from one change to the next, and reversal_s to one that takes it back (VECTO: 2 s, 10 s)
+    """
+
+    gap_s: float = 0.5
+    ratio_lag_s: float = 0.1
+    between_s: float = 2.0
+    reversal_s: float = 10.0
+
+
+_RANGES = {
+    "lag_s": (0.0, 1.0),
+    "friction": (0.05, 2.0),
+    "driven_share": (0.05, 1.0),
+    "height_share": (0.0, 1.0),
+    "stiffness": (0.1, 100.0),
+    "shape": (0.5, 3.0),
+    "curvature": (-20.0, 1.0),
+    "relaxation_m": (0.01, 5.0),
+    "slipping_nm": (1.0, 1e5),
+    "sticking_nm": (1.0, 1e5),
+    "slip_scale_radps": (1e-3, 1e4),
+    "closing_s": (0.0, 5.0),
+    "gap_s": (0.0, 5.0),
+    "ratio_lag_s": (0.0, 2.0),
+    "between_s": (0.0, 60.0),
+    "reversal_s": (0.0, 600.0),
+}
+
+
+def check_ranges(part: Tyre | Clutch | Shifting) -> None:
+    """DataError for a figure that no car has."""
+    for name, value in part._asdict().items():
+        low, high = _RANGES[name]
+        if not low <= value <= high:  # nor NaN
+            raise DataError(
+                f"{type(part).__name__.lower()}: {name} {value:g}; allowed: {low:g} to {high:g}"
+            )
