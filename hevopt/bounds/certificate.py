@@ -23,6 +23,7 @@ import numpy as np
 from hevopt.bounds.lower_dp import end_slack_j, lower_bound_kg
 from hevopt.bounds.prices import EPSILON, Line, one_price_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
+from hevopt.display.facts import Shown
 from hevopt.errors import SolverError
 from hevopt.problem.problem import Problem, Trajectory
 
@@ -69,8 +70,8 @@ class Claim:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Certificate:
+@dataclass(frozen=True, slots=True, repr=False)
+class Certificate(Shown):
     """Bounds on cost (kg: fuel, plus weighted NOx) for any end charge, as supporting lines.
 
     proofs: kind of proof -> its lines; the highest line at an end charge is the bound there
@@ -83,6 +84,16 @@ class Certificate:
     at_least: dict[Proof, float] = field(default_factory=dict)
     failures: dict[Proof, str] = field(default_factory=dict)
     end_slack_j: float = 0.0
+
+    def _facts(self) -> dict[str, object]:
+        bound_kg, proof = self.bound_kg(self.end_min_j)
+        return {
+            "bound_kg": bound_kg,
+            "proof": proof,
+            "end_min_j": self.end_min_j,
+            "price_kgpj": self.price_kgpj,
+            "failures": list(self.failures),
+        }
 
     def bound_kg(self, end_j: float) -> tuple[float, Proof]:
         """The highest proven bound for plans that end with at least `end_j`, and its kind of proof."""

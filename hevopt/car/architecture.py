@@ -13,6 +13,7 @@ from hevopt.car.engine import Engine
 from hevopt.car.machine import Machine
 from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery
 
@@ -36,8 +37,8 @@ class Coupling:
     machine_shift_fuel_kg: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Architecture:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Architecture(Shown):
     """A complete car: every component, the coupling and the functions it may use.
 
     soc_end: least state of charge at the end of a cycle
@@ -59,6 +60,18 @@ class Architecture:
     gear: Literal["cycle", "free"]
     contents: Mapping[str, Any]
     files: tuple[Path, ...]
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "name": self.name,
+            "coupling": self.coupling.kind,
+            "mass_kg": self.vehicle.mass_kg,
+            "engine": self.engine.name,
+            "machines": tuple(machine.name for machine in self.machines),
+            "soc_start": self.soc_start,
+            "gear": self.gear,
+            "source": self.source,
+        }
 
     @property
     def source(self) -> Path:

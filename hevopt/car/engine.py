@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.engine_laws import EngineLaw
+from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Engine:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Engine(Shown):
     """An engine and its fuel. full_load_*: (point,) curve of the highest torque over speed."""
 
     name: str

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.grid import along, highest_known, interpolated
+from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -71,8 +72,8 @@ class NoxCoefficients:
     dp: float
 
 
-@dataclass(frozen=True, slots=True)
-class CompactLaw:
+@dataclass(frozen=True, slots=True, repr=False)
+class CompactLaw(Shown):
     """Fuel and NOx by coefficients over mean pressure and mean piston speed.
 
     speed_max_radps: beyond it an engine is not used, and the polynomials mean nothing
@@ -140,8 +141,8 @@ class CompactLaw:
         return 4 * pi * torque_nm / self.displacement_m3 / _PA_PER_BAR
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class EngineMap:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class EngineMap(Shown):
     """A measured map; cells that were not measured are NaN.
 
     speed_radps: (speed,), torque_nm: (torque,), fuel and nox: (speed, torque), kg/s; nox None: unknown

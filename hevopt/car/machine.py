@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.machine_laws import LossLaw
+from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TorqueCurve:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TorqueCurve(Shown):
     """The largest torque of either sign over speed; the first holds down to rest, there is none beyond the last.
 
     speed_radps, torque_nm: (point,)
@@ -32,8 +33,8 @@ class TorqueCurve:
         return replace(self, torque_nm=factor * self.torque_nm)
 
 
-@dataclass(frozen=True, slots=True)
-class Machine:
+@dataclass(frozen=True, slots=True, repr=False)
+class Machine(Shown):
     """A machine: its limits and the law of its loss.
 
     full_load: what holds beside the limits of torque and power; None for these alone.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.grid import interpolated
+from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 
@@ -86,8 +87,8 @@ class LossByCoefficients:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LossMap:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LossMap(Shown):
     """A measured loss map, machine and inverter; cells that were not measured are NaN.
 
     speed_radps: (speed,), torque_nm: (torque,) of both signs, loss: (speed, torque), W

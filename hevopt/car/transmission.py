@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
+
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Gearbox:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Gearbox(Shown):
     """Forward gears with the final drive; gear 0 is neutral.
 
     ratios, efficiency: (gear + 1,) input to wheels, index 0 for neutral

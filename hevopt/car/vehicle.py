@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.units import STANDARD_GRAVITY_MPS2
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Vehicle:
+@dataclass(frozen=True, slots=True, repr=False)
+class Vehicle(Shown):
     """A car without its powertrain.
 
     road_load: (4,) force on a level road as polynomial of speed, F = r0 + r1 v + r2 v² + r3 v³ (N, m/s);

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError, Fault
 from hevopt.files.lookup import find, read_text, shipped_names
 from hevopt.files.shown import printable, shown
@@ -42,8 +43,8 @@ _Tell = Callable[[int, str], None]
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cycle:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Cycle(Shown):
     """A speed trace. `gear` and `clutch_open` are None where the file lists none.
 
     time_s, speed_mps: (sample,)
@@ -66,6 +67,15 @@ class Cycle:
                 values = np.array(values)
                 values.flags.writeable = False
                 object.__setattr__(self, field, values)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "name": self.name,
+            "samples": len(self.time_s),
+            "duration_s": self.duration_s,
+            "distance_m": self.distance_m,
+            "gears": self.gear is not None,
+        }
 
     @property
     def distance_m(self) -> float:

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from hevopt.car.transmission import Gearbox, gears_from_shift_speeds
 from hevopt.car.vehicle import Vehicle, tractive_force_n
+from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Demand:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Demand(Shown):
     """Wheel torque and speed per step; every array is (time,). Torque > 0 drives the car."""
 
     time_s: Array

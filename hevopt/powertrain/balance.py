@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.transmission import input_torque_nm, output_torque_nm
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.joint import Joint
 
@@ -25,8 +26,8 @@ _ADDED_PLACES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 _SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency", "fuel cut")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Balance:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Balance(Shown):
     """Torques in Nm, (time, level).
 
     machine, engine: at their shafts; clutch: through a slipping or locked clutch
@@ -44,8 +45,8 @@ class Balance:
     least_engine: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Around:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Around(Shown):
     """Where to add machine torques: close to those of a plan.
 
     torque_nm: (engine on, machine gear, engine gear) -> (time,) torque of the plan, NaN where it drives another way

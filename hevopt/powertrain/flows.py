@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.transmission import output_torque_nm
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.balance import Balance, balance
 from hevopt.powertrain.joint import Joint
@@ -25,15 +26,15 @@ _NAMES = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Way:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Way(Shown):
     """A joint, and the (time, level) machine torques of its controls."""
 
     joint: Joint
     machine_nm: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PowerFlows(Flows):
     """Of the controls of all ways, those of the first way first."""
 

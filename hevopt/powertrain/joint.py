@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.driving.driver import launch_speed_radps
 
@@ -15,8 +16,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Joint:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Joint(Shown):
     """One discrete way to drive; all arrays (time,).
 
     machine_gear: 0 where the machine has no choice; engine_gear: 0 where the cycle gives the gear

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem import _battery_kernels as kernels
 from hevopt.problem._battery_kernels import BatteryArrays
@@ -22,8 +23,8 @@ _WINDOW_TOLERANCE, _ENERGY_ROUNDING = 1e-9, 4e-12
 _ROUNDING = 1e-12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Battery:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Battery(Shown):
     """A battery pack at its terminals; curves over SOC are linear between their points.
 
     soc: (point,) increasing, from at most soc_min to at least soc_max
@@ -50,6 +51,16 @@ class Battery:
             values.flags.writeable = False
             object.__setattr__(self, field, values)
         self._check()
+
+    def _facts(self) -> dict[str, object]:
+        low, high = energy_j(self, np.array([self.soc_min, self.soc_max]))
+        return {
+            "points": len(self.soc),
+            "capacity_as": self.capacity_as,
+            "open_circuit_v": (float(self.open_circuit_v[0]), float(self.open_circuit_v[-1])),
+            "soc_window": (self.soc_min, self.soc_max),
+            "window_j": float(high - low),
+        }
 
     def _check(self) -> None:
         curves = (self.open_circuit_v, self.discharge_ohm, self.charge_ohm)

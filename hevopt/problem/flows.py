@@ -6,14 +6,18 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.frozen import frozen
 
 
-class Flows(Mapping[str, Array]):
+class Flows(Mapping[str, Array], Shown):
     """name -> (time, control) powers, speeds and torques."""
 
     __slots__ = ()
+
+    def _facts(self) -> dict[str, object]:
+        return {"flows": list(self)}
 
     @abstractmethod
     def along(self, control: Indices) -> dict[str, Array]:

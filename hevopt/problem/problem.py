@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery, energy_j, within_limits
 from hevopt.problem.table import Array, ControlTable, Reject
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Problem(Shown):
     """A control table, a battery and what is asked: least fuel + nox_weight x NOx, with enough charge left.
 
     soc_end_min: state of charge that must at least be left at the end
@@ -77,21 +78,35 @@ class Problem:
         ):  # fmt: skip
             object.__setattr__(self, name, value)
 
+    def _facts(self) -> dict[str, object]:
+        steps, controls = self.table.fuel_kg.shape
+        return {
+            "steps": steps,
+            "controls": controls,
+            "soc_start": self.soc_start,
+            "soc_end_min": self.soc_end_min,
+            "soc_window": (self.battery.soc_min, self.battery.soc_max),
+            "nox_weight": self.nox_weight,
+        }
+
     def with_nox_weight(self, nox_weight: float) -> "Problem":
         """The same problem with another objective."""
         return replace(self, nox_weight=nox_weight)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Plan(Shown):
     """A strategy's proposal. control: (time,) indices into the table; notes: what the solver can tell."""
 
     control: NDArray[np.int64]
     notes: Mapping[str, Any] = field(default_factory=dict)
 
+    def _facts(self) -> dict[str, object]:
+        return {"steps": len(self.control), "notes": self.notes}
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trajectory(Shown):
     """What a plan does on its problem, added up by simulate.
 
     energy_j, soc: (time + 1,), stored energy and state of charge at the steps' ends
@@ -112,6 +127,16 @@ class Trajectory:
     cost_kg: float
     flows: Mapping[str, Array]
     residuals: Mapping[str, Array]
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "steps": len(self.control),
+            "fuel_kg": self.total_fuel_kg,
+            "nox_kg": self.total_nox_kg,
+            "cost_kg": self.cost_kg,
+            "soc_start": float(self.soc[0]),
+            "soc_end": float(self.soc[-1]),
+        }
 
     @property
     def total_fuel_kg(self) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.flows import Flows, GivenFlows
 from hevopt.problem.frozen import frozen
@@ -62,8 +63,8 @@ class Control(NamedTuple):
     engine_gear: int = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Signals:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Signals(Shown):
     """What a rule may look at, all (time,): the driver's view of the step."""
 
     speed_mps: Array
@@ -78,8 +79,8 @@ class Signals:
         return type(self), tuple(getattr(self, part.name) for part in fields(self))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ControlTable:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ControlTable(Shown):
     """Every control at every step. It copies what it is given, and nothing in it can be changed.
 
     time_s, step_s: (time,) start and length of the steps
@@ -229,6 +230,16 @@ class ControlTable:
         """(time, control) True where the control can be used."""
         usable: NDArray[np.bool_] = self.reject == 0
         return usable
+
+    def _facts(self) -> dict[str, object]:
+        steps, controls = self.fuel_kg.shape
+        return {
+            "steps": steps,
+            "controls": controls,
+            "modes": len(self.switch_fuel_kg),
+            "duration_s": float(np.sum(self.step_s)),
+            "feasible": f"{np.mean(self.reject == 0):.0%}",
+        }
 
     def labels_of(self, control: NDArray[np.int64]) -> dict[str, list[Any]]:
         """Column name -> what the labels say of each of some controls; a gear of 0 is none, or the cycle's."""

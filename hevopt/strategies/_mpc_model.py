@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hevopt.bounds.prices import drain_at_j
+from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, require_choices
 from hevopt.problem.problem import Problem
@@ -21,8 +22,8 @@ _LEAST_PRICE_KGPJ = 1e-12
 _ROUNDING = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Model:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Model(Shown):
     """Steps, controls and the feedback's two references.
 
     drain_j: (entry,) fall of stored energy at the start's state of charge

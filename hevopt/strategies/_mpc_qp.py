@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from hevopt.display.facts import Shown
 from hevopt.errors import SolverError
 from hevopt.problem.arrays import Array
 
@@ -24,8 +25,8 @@ OSQP_SETTINGS = {
 CLARABEL_SETTINGS = {"verbose": False, "max_iter": 200}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PreviewQp:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PreviewQp(Shown):
     """Numbers of one preview, in units of energy and price. curvature, slope, low, knee, slack: (step,)
 
     start: charge before the first step; bottom, top: (step,) bounds on charge; gain: fall of the terminal price

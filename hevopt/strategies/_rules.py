@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hevopt.bounds.prices import one_price_dual
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices, choices_of, require_choices
@@ -28,8 +29,8 @@ _CHARGE_LEVELS = 41
 _SOC_LEVEL_SHARE = 0.25
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rules:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Rules(Shown):
     """Indices that each rule would take, per step; -1 where a step has none.
 
     off, electric, recover: (time,); standing, launching, braking, power_w: (time,) class and wheel power
@@ -49,8 +50,8 @@ class Rules:
     price_kgpj: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Outcome(Shown):
     """One member of a rule family: its controls, cost, NOx and end charge."""
 
     control: Indices

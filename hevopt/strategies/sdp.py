@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hevopt.bounds.prices import one_price_dual
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem import battery as battery_model
 from hevopt.problem.arrays import Array, Indices
@@ -59,8 +60,8 @@ _TOLERANCE = 1e-3
 _EXCESS = 10.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Chain:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Chain(Shown):
     """Demand as a Markov chain.
 
     speed_mps, power_w: (class,) centres; class 0 is standing

@@ -5,6 +5,7 @@ from time import perf_counter
 
 from hevopt.bounds.certificate import TARGET_GAP, Certificate, certify
 from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import UnknownNoxError
 from hevopt.files.shown import printable
@@ -20,8 +21,8 @@ _REFINED_ENOUGH = 2e-4
 _REFINEMENTS_MAX = 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Case:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Case(Shown):
     """A car on a cycle, with the plan of dynamic programming and the certificate along its rollout."""
 
     car: Architecture
@@ -31,6 +32,16 @@ class Case:
     dp_plan: Plan
     dp_trajectory: Trajectory
     dp_s: float
+
+    def _facts(self) -> dict[str, object]:
+        bound_kg, proof = self.certificate.bound_kg(self.dp_trajectory.end_j)
+        return {
+            "car": self.car.name,
+            "cycle": self.cycle.name,
+            "dp_cost_kg": self.dp_trajectory.cost_kg,
+            "bound_kg": bound_kg,
+            "proof": proof,
+        }
 
 
 _DEFAULTS = Settings()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, get_args
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown, html_table
 from hevopt.driving.cycle import DISTANCE_MIN_M, Cycle, load_cycle
 from hevopt.errors import (
     DataError,
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
 _FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+@dataclass(frozen=True, slots=True, repr=False)
+class Comparison(Shown):
     """All rows of a cycle, and the messages of what failed, by architecture and strategy.
 
     reference: the row that changes are against, None where there are none
@@ -55,6 +56,16 @@ class Comparison:
     end_asked: Mapping[str, float] = field(default_factory=dict)
     lost_proofs: Mapping[str, str] = field(default_factory=dict)
     left_out: Sequence[str] = ()
+
+    def _facts(self) -> dict[str, object]:
+        failed = sum(not row.solved for row in self.rows)
+        rows = len(self.rows)
+        return {"cycle": self.cycle, "rows": rows, "failed": failed, "reference": self.reference}
+
+    def _repr_html_(self) -> str:
+        facts = [row._facts() for row in self.rows]
+        heads = list(facts[0]) if facts else []
+        return html_table(f"cycle {self.cycle}", heads, [list(fact.values()) for fact in facts])
 
     def to_frame(self) -> "pd.DataFrame":
         """The rows as a table of pandas, one line each: the cycle, then the fields of `Row`, units in the names."""

@@ -21,6 +21,7 @@ from itertools import pairwise
 from math import isfinite
 
 from hevopt.bounds.certificate import Proof, certify
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import simulate
@@ -58,8 +59,8 @@ class Point:
         return self.fuel_kg + nox_weight * self.nox_kg
 
 
-@dataclass(frozen=True, slots=True)
-class Front:
+@dataclass(frozen=True, slots=True, repr=False)
+class Front(Shown):
     """points: from least fuel to least NOx; half_planes: by weight, one for each that was solved.
 
     corners: (nox_kg, fuel_kg) of the outer front, from most NOx to least; the edge before the first has the slope

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 
 from hevopt.bounds.certificate import Claim
 from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown
 from hevopt.errors import HevoptError
 from hevopt.files.shown import printable
 from hevopt.problem.problem import Problem, Trajectory
@@ -19,8 +20,8 @@ _TINY = 1e-9
 _ROUNDING_J = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+@dataclass(frozen=True, slots=True, repr=False)
+class Row(Shown):
     """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
     no reference, no fuel, or a bound of 0; of NOx also where the engine has no data on it.
 
@@ -53,6 +54,15 @@ class Row:
     def solved(self) -> bool:
         """Whether there are figures: the case did not fail."""
         return self.fuel_l_per_100km is not None
+
+    def _facts(self) -> dict[str, object]:
+        names = "architecture", "strategy", "fuel_l_per_100km", "bound_l_per_100km"
+        return {
+            **{name: getattr(self, name) for name in names},
+            "gap_percent": None if self.gap_percent is None else round(self.gap_percent, 6),
+            "proof": None if self.certificate is None else str(self.certificate.proof),
+            "status": str(self.status),
+        }
 
     def as_dict(self) -> dict:
         """All fields by name, in order, as JSON has them: status and certificate as text."""

@@ -14,6 +14,7 @@ from typing import Any, Unpack
 
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
+from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle, load_cycle
 from hevopt.errors import HevoptError
 from hevopt.strategies import fitting, strategy_named
@@ -30,8 +31,8 @@ _TINY = 1e-9
 _RULES = ("conventional", "start_stop", "baseline")
 
 
-@dataclass(frozen=True, slots=True)
-class Effect:
+@dataclass(frozen=True, slots=True, repr=False)
+class Effect(Shown):
     """What one parameter does to one strategy's result; lists have one entry per value.
 
     fuel_l_per_100km: charge-corrected, None where the value cannot be solved; reasons: why, None where it is
@@ -52,6 +53,10 @@ class Effect:
     elasticity: float | None
     elasticity_nox: float | None
     reasons: list[str | None]
+
+    def _facts(self) -> dict[str, object]:
+        names = "architecture", "strategy", "parameter", "values", "delta_percent", "elasticity"
+        return {name: getattr(self, name) for name in names}
 
     def as_dict(self) -> dict[str, Any]:
         """All fields by name, in order."""

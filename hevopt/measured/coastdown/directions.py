@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import printable
 from hevopt.measured.tables.table import Column, Measured
@@ -34,8 +35,8 @@ class Heading:
 Way = float | str | Heading | None  # of one run; None without a column
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Directions:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Directions(Shown):
     """A column of directions. values: (row,) numbers, places among the words, or radians where `angles`."""
 
     values: Array

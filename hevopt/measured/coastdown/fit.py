@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError, SolverError
 
 Array = NDArray[np.float64]
@@ -30,8 +31,8 @@ _SERIES_BELOW = 1e-8
 _RUNS_MIN = 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Run:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Run(Shown):
     """One coast-down. direction: +1 or -1; time_s, speed_mps: (sample,); place: where it was read from."""
 
     label: str
@@ -41,8 +42,8 @@ class Run:
     place: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RoadLoad:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RoadLoad(Shown):
     """A fit. coefficients: (3,) C0 (N), C1 (N s/m), C2 (N s²/m²).
 
     covariances: (direction, 3, 3) what the scatter of either direction's runs adds; freedom: (direction,) of each

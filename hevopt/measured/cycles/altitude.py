@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 
 Array = NDArray[np.float64]
@@ -27,8 +28,8 @@ _STEEPEST = 0.99  # steeper than any road; the reader of cycles refuses it
 _UNDONE_M, _UNDONE_SHARE, _UNDONE_GRADE = 300.0, 0.5, 0.002
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RoadGrade:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RoadGrade(Shown):
     """grade: (row,) over the step to the next row; rule: how it was made; hint: why it may be no road, or empty."""
 
     grade: Array

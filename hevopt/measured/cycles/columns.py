@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError, unknown_name
 from hevopt.files.shown import shown
 from hevopt.measured.cycles.dates import date_beside, with_dates
@@ -59,8 +60,8 @@ _OPTIONS = {"time": "--time-unit", "speed": "--speed-unit"}
 _RISING_SHARE = 0.9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Drive(Shown):
     """A drive as its file has it, in SI; all arrays (row,), NaN where a cell is empty or no number.
 
     time_s is None for a drive over distance_m; what the file lacks is None. notes: one text per assumption

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.driving.cycle import GRADE_MAX, SPEED_MAX_MPS
 from hevopt.errors import DataError
 from hevopt.measured.cycles.columns import Drive
@@ -32,8 +33,8 @@ _DRAWN = "drawn between its neighbours"
 _LEFT_OUT = "left out with more than a minute without a usable speed"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sound:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sound(Shown):
     """A drive over time without faults.
 
     faults: what was wrong and is mended; said: what needed no repair

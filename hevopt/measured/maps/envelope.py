@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.machine import MachineFile
+from hevopt.display.facts import Shown
 from hevopt.measured.maps.grid import Grid
 from hevopt.measured.maps.request import Imported
 from hevopt.units import RPM_PER_RADPS
@@ -17,8 +18,8 @@ FINE = 200
 _ROUNDING = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Envelope:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Envelope(Shown):
     """Where the car may ask for: between two torques at each speed; all (speed,)."""
 
     speed_radps: Array

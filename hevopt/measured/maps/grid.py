@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.grid import interpolated
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.maps.lines import Lines, envelope_nm
 
@@ -30,8 +31,8 @@ _SHEAR = 1e-3
 _AXIS_MAX = 400
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Grid:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Grid(Shown):
     """A quantity on axes; values: (speed, torque), NaN where not measured."""
 
     speed_radps: Array
@@ -43,8 +44,8 @@ class Grid:
         return interpolated(self.speed_radps, self.torque_nm, self.values, torque_nm, speed_radps)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Axes:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Axes(Shown):
     """Where a grid's values stand. lattice: the points stand there already; rule: how it came about, in words."""
 
     speed_radps: Array

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.maps.points import Points
 from hevopt.measured.tables.rows import runs
@@ -32,8 +33,8 @@ _REPEATS = 0.02
 _TINY = 1e-12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lines:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Lines(Shown):
     """Points by speed line. line: (point,) which; speed_radps: (line,); regular: whether there are such lines."""
 
     points: Points

@@ -10,6 +10,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.maps.roles import VALUES_OF
 from hevopt.measured.maps.tables import Source, Table, curve_table, read_table
@@ -32,8 +33,8 @@ class EngineFacts:
     fuel_density_kgpm3: float | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Points:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Points(Shown):
     """A quantity at measured points; arrays (point,).
 
     rectangular: read from a grid; roles: of the columns read; notes: how they were read
@@ -48,8 +49,8 @@ class Points:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Curve(Shown):
     """Torque over speed, speed rising; arrays (point,). note: where it comes from; roles: of the columns read."""
 
     speed_radps: Array

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import shown
 from hevopt.measured.maps.matlab import curves_table, points_table
@@ -45,8 +46,8 @@ class Source:
     extra: bool = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Table:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Table(Shown):
     """Rows of speed, torque and value columns, each (row,) in SI, by role.
 
     kinds, read: role -> quantity measured, and how its column was read

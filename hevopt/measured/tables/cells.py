@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.files.shown import shown
 from hevopt.measured.tables.dates import Slashed, in_order, is_moment, moment_in
 
@@ -33,8 +34,8 @@ _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[., '’\u00a0\u202f][0-9]{3})+(?:[.
 _PERCENT = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?\s?%")
 
 
-@dataclass(slots=True)
-class Cells:
+@dataclass(slots=True, repr=False)
+class Cells(Shown):
     """A column while it is read. `found` maps a way of writing to the first line and cell that has it.
 
     strange: (row, text) of cells that are neither numbers nor empty; words: rows of each text among them, of the

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
+
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
@@ -15,8 +17,8 @@ _SHARED_MIN = 0.25
 _TICK_ERROR = 1e-3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ticks:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Ticks(Shown):
     """Moments of a coarse clock. begins, counts: (moment,) first row and rows of each; tick_s: its smallest step"""
 
     begins: Rows

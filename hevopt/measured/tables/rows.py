@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import printable
 from hevopt.measured.tables.cells import LISTED, Cells, is_empty, is_value, marks_of, read_chunk
@@ -23,8 +24,8 @@ _COLUMNS_MAX = 2_000
 _SLOW_CELLS_MAX = 2_500_000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Table:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Table(Shown):
     """What the rows of a file hold. units: None without a units row; lines: (row,)
 
     also: by column, its names in further header rows

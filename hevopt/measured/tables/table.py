@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import printable, shown
 from hevopt.measured.tables.cells import Cells
@@ -35,8 +36,8 @@ _UNREADABLE = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Column:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Column(Shown):
     """A column of a file, in the file's unit.
 
     unit: as the file writes it, None where nothing says it; source: how it is known
@@ -63,8 +64,8 @@ class Column:
     sampled: NDArray[np.int64] | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Measured:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Measured(Shown):
     """A file's table. lines: (row,) line or sheet row of every data row; notes: what was assumed on reading.
 
     left_out: what else the file holds that is no column of it, or ''; one of the notes too

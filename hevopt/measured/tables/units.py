@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import shown
 from hevopt.measured.tables.rows import listed
@@ -18,8 +19,8 @@ _DAY_S = 86400.0
 _USUAL_STEPS_S = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Quantity:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Quantity(Shown):
     """A column in SI.
 
     values: (row,); quantity: a key of the unit table; note: the column's name, its unit and how that is known

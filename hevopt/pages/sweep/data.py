@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.lookup import without_folders
 from hevopt.files.shown import printable
@@ -48,8 +49,8 @@ class Solved(NamedTuple):
     status: Status
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Figures:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Figures(Shown):
     """Designs in the order of their numbers; arrays and lists are (design,), NaN where there is nothing.
 
     objective, fuel, nox: means over the cycles of the best strategy's, fuel charge-corrected (l/100 km, mg/km)

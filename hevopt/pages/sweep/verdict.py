@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.pages.sweep.data import Figures, Scalar, Sweep
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
 
@@ -15,8 +16,8 @@ _TIGHT_PERCENT = 0.001
 _IN_SENTENCE = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Group:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Group(Shown):
     """Designs that compete. weight: theirs, None where there are too many weights to tell them apart.
 
     ranked: indices of those with an objective (a bound, where nothing else was asked for), the best first, those

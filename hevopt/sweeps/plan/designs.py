@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import printable, shown
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT
@@ -42,8 +43,8 @@ class Design:
         return float(self.values.get(NOX_WEIGHT, 0.0))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Designs(Sequence[Design]):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Designs(Sequence[Design], Shown):
     """Designs in order, each made when it is asked for: a million take some megabytes.
 
     folder: of the study; levels: per parameter, its values

@@ -1,0 +1,1 @@
+"""How objects show themselves: in one line, in a notebook, in a plot."""
