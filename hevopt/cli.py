@@ -22,7 +22,7 @@ from hevopt.commands import (
 )
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
-from hevopt.errors import DataError, HevoptError, SolverError
+from hevopt.errors import DataError, HevoptError, SolverError, comes_from_interrupt
 from hevopt.files.writing import files_told
 
 app = typer.Typer(
@@ -100,7 +100,7 @@ def _status_and_message() -> tuple[int, str]:
         return _INTERRUPTED, ""
     except SystemError as error:
         # Compiled loops turn an interrupt into this.
-        if not _comes_from_interrupt(error):
+        if not comes_from_interrupt(error):
             raise
         return _INTERRUPTED, ""
     except Exception as error:
@@ -109,12 +109,6 @@ def _status_and_message() -> tuple[int, str]:
             raise
         error.show()
         return error.exit_code, ""
-
-
-def _comes_from_interrupt(error: BaseException | None) -> bool:
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
 
 
 if __name__ == "__main__":

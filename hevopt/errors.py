@@ -110,3 +110,10 @@ def unknown_name(kind: str, name: str, known: list[str], meant: Sequence[str] = 
     lowered = [k for k in known if k.lower() == name.lower() and k not in close]
     best = f"close matches: {', '.join(lowered + close)}; " if lowered or close else ""
     return DataError(f"{kind} {name!r} not found; {best}available: {', '.join(known)}")
+
+
+def comes_from_interrupt(error: BaseException | None) -> bool:
+    """Whether an error is what compiled loops turned an interrupt into."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None

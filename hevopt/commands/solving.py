@@ -106,6 +106,7 @@ def run(
     from hevopt.files.writing import check_outs
     from hevopt.output import file_tables as outputs
     from hevopt.output import terminal_tables as report
+    from hevopt.strategies import strategy_named
     from hevopt.studies import comparison as study
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
@@ -133,6 +134,7 @@ def run(
         settings.nox_weight,
         end_asked=study.end_asked([car]),
         lost_proofs=study.lost_proofs(case),
+        causal=frozenset([strategy]) if strategy_named(strategy).causal else frozenset(),
     )
     if out is not None:
         steps = outputs.step_frame(case, trajectory)

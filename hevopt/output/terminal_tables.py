@@ -10,7 +10,6 @@ from rich.text import Text
 from hevopt.files.shown import printable
 from hevopt.problem.problem import Plan
 from hevopt.reproduction.published import published_beside
-from hevopt.strategies import STRATEGIES
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row, end_asked_text, marked, no_reference_text
 
@@ -42,18 +41,18 @@ def comparison_table(comparison: Comparison) -> Table:
             table.add_section()
         previous = row.architecture
         # Text, because a name such as "[red]" would be markup in a string.
-        table.add_row(*map(Text, _cells(row)))
+        table.add_row(*map(Text, _cells(row, comparison.causal)))
     return table
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: Row, causal: frozenset[str]) -> list[str]:
     def number(value: float | None, form: str) -> str:
         return "-" if value is None else format(0.0 if abs(value) < 5e-7 else value, form)
 
     change = None if row.soc_end is None else row.soc_end - row.soc_start
     return [
         row.architecture,
-        row.strategy + (_CAUSAL_MARK if STRATEGIES[row.strategy].causal else ""),
+        row.strategy + (_CAUSAL_MARK if row.strategy in causal else ""),
         number(row.fuel_l_per_100km, ".3f"),
         number(row.delta_fuel_percent, "+.1f"),
         number(row.co2_g_per_km, ".1f"),

@@ -1,9 +1,11 @@
-"""All strategies by name: Problem to Plan. A new strategy is one file and one line here."""
+"""All strategies by name: Problem to Plan. A new strategy is one file and one line here; users bring their own by
+`register`, or with the call that uses them.
+"""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
-from hevopt.errors import unknown_name
+from hevopt.errors import DataError, unknown_name
 from hevopt.problem.problem import Plan
 from hevopt.strategies import (
     a_ecms,
@@ -17,6 +19,16 @@ from hevopt.strategies import (
     sdp,
     start_stop,
 )
+from hevopt.strategies.brought import (
+    FORMS,
+    Elsewhere,
+    Guarded,
+    Located,
+    check_name,
+    located,
+    pairs_of,
+    place_of,
+)
 
 
 class Strategy(NamedTuple):
@@ -25,16 +37,18 @@ class Strategy(NamedTuple):
     causal: decides each step without knowing more of the cycle than `knows` says
     usual: part of a comparison that names no strategies
     previews: takes horizon_s; learns: takes training, problems of the same car on other cycles
+    place: where a strategy of the user's stands, None for the shipped ones and where no other process finds it
     """
 
     solve: Callable[..., Plan]
-    knows: str
-    needs: frozenset[str]
+    knows: str = "not said"
+    needs: frozenset[str] = frozenset()
     excludes: frozenset[str] = frozenset()
     causal: bool = False
     usual: bool = True
     previews: bool = False
     learns: bool = False
+    place: Located | None = None
 
 
 _HYBRID = frozenset({"power_management"})
@@ -60,18 +74,81 @@ STRATEGIES: dict[str, Strategy] = {
 }
 
 
-def strategy_named(name: str) -> Strategy:
-    """The strategy of a name; DataError with the close matches otherwise."""
-    if name not in STRATEGIES:
-        raise unknown_name("strategy", name, list(STRATEGIES))
-    return STRATEGIES[name]
+_NO_OTHERS: Mapping[str, Strategy] = {}
+_registered: dict[str, Strategy] = {}
+
+
+def every_strategy() -> dict[str, Strategy]:
+    """The shipped strategies, and those that were registered."""
+    return STRATEGIES | _registered
+
+
+def strategy_named(name: str, others: Mapping[str, Strategy] = _NO_OTHERS) -> Strategy:
+    """The strategy of a name, shipped, registered or one of some others; DataError with the close matches."""
+    known = {**every_strategy(), **others}
+    if name not in known:
+        raise unknown_name("strategy", name, list(known))
+    return known[name]
+
+
+def register(
+    name: str,
+    solve: Callable[..., Any] | Strategy | str,
+    *,
+    causal: bool = False,
+    knows: str = "not said",
+    usual: bool = False,
+) -> None:
+    """Make a strategy of your own known by a name: to `compare`, fronts, sensitivities, sweeps and pages.
+
+    solve: a function from Problem to (time,) control indices or a Plan; FILE.py:FUNCTION or MODULE:FUNCTION,
+    imported when it is first used; or a Strategy, which says the rest itself
+    causal: decides each step without knowing more of the cycle than `knows` says
+    usual: part of a comparison that names no strategies
+    What it returns is driven by `simulate`: whatever it does wrong is a failed row with one message. A name
+    that is registered again stands for the new one. DataError for the name of a shipped one, or where there is no
+    such function.
+    """
+    _registered[check_name(name, STRATEGIES)] = brought(
+        name, solve, causal=causal, knows=knows, usual=usual
+    )
+
+
+def brought(name: str, what: Any, **marks: Any) -> Strategy:
+    """A user's function, reference or Strategy as a strategy of that name; marks: fields of Strategy."""
+    check_name(name, STRATEGIES)
+    place = None
+    if isinstance(what, Strategy):
+        what, marks = what.solve, what._asdict()
+    if isinstance(what, str | Located):
+        place = located(what) if isinstance(what, str) else what
+        what = Elsewhere(place)
+    if not callable(what):
+        raise DataError(
+            f"strategy {name}: a {type(what).__name__} is no function; needed: a function from Problem to control "
+            f"indices or a Plan, or {FORMS}"
+        )
+    place = place_of(what) if place is None else place
+    return Strategy(**marks | {"solve": Guarded(name, what), "place": place})
+
+
+def chosen(wanted: Any) -> tuple[list[str] | None, dict[str, Strategy]]:
+    """The names of what users want, None for the usual ones, and the strategies that they bring along by some.
+
+    wanted: a name, a list of names and pairs (name, function), or a mapping of name to function
+    """
+    pairs = pairs_of(wanted)
+    if pairs is None:
+        return None, {}
+    own = {name: brought(name, what) for name, what in pairs if what is not None}
+    return [name for name, _ in pairs], own
 
 
 def fitting(functions: frozenset[str], *, every: bool = False) -> list[str]:
     """Names of the strategies that make sense for an architecture's functions: the usual ones, or every one."""
     return [
         name
-        for name, strategy in STRATEGIES.items()
+        for name, strategy in every_strategy().items()
         if strategy.needs <= functions
         and not strategy.excludes & functions
         and (every or strategy.usual)

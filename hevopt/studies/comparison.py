@@ -23,7 +23,7 @@ from hevopt.errors import (
 )
 from hevopt.files.shown import printable, shown
 from hevopt.problem.problem import Plan, Problem, Trajectory
-from hevopt.strategies import strategy_named
+from hevopt.strategies import Strategy, chosen, strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
 from hevopt.studies.frames import rows_frame
@@ -45,6 +45,7 @@ class Comparison(Shown):
     end_asked: car -> state of charge asked at the end, of those where it is another than the start's
     lost_proofs: architecture and kind of proof -> why it was tried and not found
     left_out: settings that have no meaning for some of the cars, and why
+    causal: strategies of the rows that decide without knowing the rest of the cycle
     """
 
     cycle: str
@@ -56,6 +57,7 @@ class Comparison(Shown):
     end_asked: Mapping[str, float] = field(default_factory=dict)
     lost_proofs: Mapping[str, str] = field(default_factory=dict)
     left_out: Sequence[str] = ()
+    causal: frozenset[str] = frozenset()
 
     def _facts(self) -> dict[str, object]:
         failed = sum(not row.solved for row in self.rows)
@@ -83,20 +85,26 @@ class Watch(NamedTuple):
     observe: Callable[[Case, Row, Plan, Trajectory], None] = lambda *solved: None
 
 
+_NOBODY = Watch()
+_NO_OTHERS: Mapping[str, Strategy] = {}
+# A name, names and pairs (name, function), or a function by its name.
+Strategies = str | Sequence[str | tuple[str, Any]] | Mapping[str, Any]
+
+
 def solve(problem: Problem, strategy: str = "dp", **settings: Any) -> Plan:
     """The plan of a strategy by name, with the settings that its `solve` names.
 
     Raises DataError for a name or a setting that there is not, with those that there are.
     """
-    chosen = strategy_named(strategy).solve
-    _check_keywords(f"solve, {strategy}", chosen, settings)
-    return chosen(problem, **settings)
+    own = strategy_named(strategy).solve
+    _check_keywords(f"solve, {strategy}", own, settings)
+    return own(problem, **settings)
 
 
 def compare(
     cycle: Cycle | str | Path = "nedc",
     architectures: Architecture | str | Path | Iterable[Architecture | str | Path] | None = None,
-    strategies: str | Sequence[str] | None = None,
+    strategies: Strategies | None = None,
     *,
     progress: Callable[[str, int, int], None] | None = None,
     observe: Callable[[Case, Row, Plan, Trajectory], None] | None = None,
@@ -105,14 +113,15 @@ def compare(
     """Every strategy (by default the usual ones that fit) on every architecture (by default the shipped ones).
 
     cycle, architectures: names of shipped ones, files, or what was loaded; one, or several
-    strategies: one name or several; "all" for every one that fits
+    strategies: a name or a list of names, "all" for every one that fits; {name: function} for one of your own, also
+    as a pair in a list: a function from Problem to control indices or a Plan, see `register`
     progress: called with what comes next, and how many cases of how many are done
     observe: called with every solved case, its row (no reference yet), plan and trajectory
     settings: the fields of `Settings`, such as nox_weight, refine or mass_kg
     Raises DataError for a wrong name, file or setting, with those that there are. Where an engine has no NOx data,
     what asks for NOx is a failed row; UnknownNoxError if nothing else is asked.
     """
-    names = [strategies] if isinstance(strategies, str) else strategies
+    names, others = chosen(strategies)
     told = settings_from("compare", settings, strategies=names)
     if isinstance(architectures, Architecture | str | Path):
         architectures = [architectures]
@@ -123,24 +132,31 @@ def compare(
         cars.cars,
         drive,
         told,
+        others=others,
         watch=Watch(**{n: who for n, who in watch.items() if who is not None}),
     )
     return replace(found, left_out=cars.left_out)
 
 
-_NOBODY = Watch()
-
-
 def compare_cars(
-    cars: Sequence[Architecture], cycle: Cycle, settings: Settings, *, watch: Watch = _NOBODY
+    cars: Sequence[Architecture],
+    cycle: Cycle,
+    settings: Settings,
+    *,
+    others: Mapping[str, Strategy] = _NO_OTHERS,
+    watch: Watch = _NOBODY,
 ) -> Comparison:
-    """The strategies of the settings on cars in which the settings are made already; see `compare`."""
+    """The strategies of the settings on cars in which the settings are made already; see `compare`.
+
+    others: strategies beside those shipped and registered
+    """
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
-    plans = [(car, strategies_for(car, settings.strategies)) for car in cars]
-    check_horizon(settings.horizon_s, [name for _, names in plans for name in names])
+    plans = [(car, strategies_for(car, settings.strategies, others)) for car in cars]
+    named = list(dict.fromkeys(name for _, names in plans for name in names))
+    check_horizon(settings.horizon_s, named, others)
     total = sum(len(names) for _, names in plans)
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
@@ -157,21 +173,45 @@ def compare_cars(
         lost |= lost_proofs(case)
         for n, name in enumerate(wanted):
             watch.progress(f"{car.name}: {name}", done + n, total)
-            try:
-                solved = run_case(case, name, settings.horizon_s)
-                rows.append(solved[0])
-                watch.observe(case, *solved)
-            except _FAILURES as error:
-                failures[f"{car.name} {name}"] = error
-                rows.append(failed_row(car, name, error))
-    if not any(row.solved for row in rows):
-        unknown = [error for error in failures.values() if isinstance(error, UnknownNoxError)]
-        if unknown and len(unknown) == len(failures):
-            raise unknown[0]
+            rows.append(_row(case, name, settings, others, watch, failures))
+    _raise_unknown_nox(rows, failures)
     rows, reference = against_reference(rows)
-    asked = end_asked(cars)
-    weight, free = settings.nox_weight, settings.free_gear
-    return Comparison(cycle.name, rows, failures, weight, reference, free, asked, lost)
+    return Comparison(
+        cycle.name,
+        rows,
+        failures,
+        settings.nox_weight,
+        reference,
+        settings.free_gear,
+        end_asked(cars),
+        lost,
+        causal=frozenset(name for name in named if strategy_named(name, others).causal),
+    )
+
+
+def _row(
+    case: Case,
+    strategy: str,
+    settings: Settings,
+    others: Mapping[str, Strategy],
+    watch: Watch,
+    failures: dict[str, HevoptError],
+) -> Row:
+    """The row of a strategy, observed; where it fails, one that says so, and the error among the failures."""
+    try:
+        solved = run_case(case, strategy, settings.horizon_s, others)
+    except _FAILURES as error:
+        failures[f"{case.car.name} {strategy}"] = error
+        return failed_row(case.car, strategy, error)
+    watch.observe(case, *solved)
+    return solved[0]
+
+
+def _raise_unknown_nox(rows: Sequence[Row], failures: Mapping[str, HevoptError]) -> None:
+    """UnknownNoxError where nothing was asked but what needs data on NOx that there are not."""
+    unknown = [error for error in failures.values() if isinstance(error, UnknownNoxError)]
+    if unknown and len(unknown) == len(failures) and not any(row.solved for row in rows):
+        raise unknown[0]
 
 
 def _check_keywords(place: str, function: Callable[..., Any], given: Mapping[str, Any]) -> None:

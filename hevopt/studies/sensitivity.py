@@ -17,9 +17,10 @@ from hevopt.car_files.load import load_architecture
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle, load_cycle
 from hevopt.errors import HevoptError
-from hevopt.strategies import fitting, strategy_named
+from hevopt.strategies import Strategy, chosen, fitting, strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
+from hevopt.studies.comparison import Strategies
 from hevopt.studies.rows import Row
 from hevopt.studies.settings import Keywords, Settings, settings_from
 from hevopt.studies.solved import run_case
@@ -29,6 +30,7 @@ from hevopt.studies.trials import Trial, trials_of
 _TINY = 1e-9
 # The optimum, and the rule that drives the car: the first that fits.
 _RULES = ("conventional", "start_stop", "baseline")
+_NO_OTHERS: Mapping[str, Strategy] = {}
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -66,27 +68,26 @@ class Effect(Shown):
 def sensitivities(
     architecture: str | Path,
     cycle: Cycle | str | Path = "nedc",
-    strategies: str | Sequence[str] | None = None,
+    strategies: Strategies | None = None,
     *,
     progress: Callable[[str, int, int], None] | None = None,
     **settings: Unpack[Keywords],
 ) -> list[Effect]:
     """The effect of every parameter that the architecture has, strategy by strategy.
 
-    architecture: name of a shipped one, or a file; strategies: one name or several, by default dynamic programming
-    and the rule that fits the car
+    architecture: name of a shipped one, or a file
+    strategies: as in `compare`, by default dynamic programming and the rule that fits the car
     progress: called with the value that comes next, and how many are done of how many
     settings: the fields of `Settings`, made in the car before any parameter is changed
     Raises DataError for a wrong name, file or setting, HevoptError where the car as given cannot be solved.
     """
-    names = [strategies] if isinstance(strategies, str) else strategies
+    names, others = chosen(strategies)
     told = settings_from("sensitivities", settings, strategies=names)
     cars = cars_of([architecture], told)
     trace = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
     (car,) = cars.cars
-    return effects_on(
-        car, cars.changes[car.name], trace, told, told.strategies, progress or _unseen
-    )
+    made, watch = cars.changes[car.name], progress or _unseen
+    return effects_on(car, made, trace, told, told.strategies, watch, others)
 
 
 def _unseen(text: str, done: int, total: int) -> None:
@@ -100,12 +101,13 @@ def effects_on(
     settings: Settings,
     strategies: Sequence[str] | None = None,
     progress: Callable[[str, int, int], None] = _unseen,
+    others: Mapping[str, Strategy] = _NO_OTHERS,
 ) -> list[Effect]:
     """The effects on a car, see `sensitivities`. made: key path -> value of what was changed when it was read."""
     base = {**made, **({"gear": "free"} if car.gear == "free" else {})}
     names = list(strategies or _usual(car.functions))
     for name in names:
-        strategy_named(name)
+        strategy_named(name, others)
     trials = trials_of(car.contents)
     total = 1 + sum(1 for trial in trials for changes in trial.changes if changes)
     done = 0
@@ -118,7 +120,7 @@ def effects_on(
             case = prepare(load_architecture(car.source, {**base, **changes}), trace, settings)
         except HevoptError as error:
             return dict.fromkeys(names, error)
-        return {name: _row(case, name) for name in names}
+        return {name: _row(case, name, others) for name in names}
 
     given = {name: _required(car.name, row) for name, row in solved({}, "as given").items()}
     effects: list[Effect] = []
@@ -131,9 +133,9 @@ def effects_on(
     return sorted(effects, key=lambda effect: names.index(effect.strategy))
 
 
-def _row(case: Case, strategy: str) -> Row | HevoptError:
+def _row(case: Case, strategy: str, others: Mapping[str, Strategy]) -> Row | HevoptError:
     try:
-        return run_case(case, strategy)[0]
+        return run_case(case, strategy, others=others)[0]
     except HevoptError as error:
         return error
 

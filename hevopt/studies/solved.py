@@ -1,6 +1,6 @@
 """One strategy on one case: which strategies fit, what each is told, and the row of what it does."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from time import perf_counter
 from typing import Any
@@ -13,7 +13,7 @@ from hevopt.errors import DataError, SolverError
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Plan, Trajectory
 from hevopt.problem.simulation import simulate
-from hevopt.strategies import STRATEGIES, fitting, strategy_named
+from hevopt.strategies import Strategy, every_strategy, fitting, strategy_named
 from hevopt.studies.case import Case, require_nox
 from hevopt.studies.rows import Row, row_of
 
@@ -21,20 +21,28 @@ from hevopt.studies.rows import Row, row_of
 EVERY = "all"
 
 
+_NO_OTHERS: Mapping[str, Strategy] = {}
+
+
 def run_case(
-    case: Case, strategy: str, horizon_s: float | None = None
+    case: Case,
+    strategy: str,
+    horizon_s: float | None = None,
+    others: Mapping[str, Strategy] = _NO_OTHERS,
 ) -> tuple[Row, Plan, Trajectory]:
     """One strategy on a case: its row (no reference yet), plan and trajectory.
 
+    others: strategies beside those shipped and registered
     Raises UnknownNoxError for a strategy that cuts NOx where the engine has no data on it.
     """
-    if _cuts_nox(strategy):
+    chosen = strategy_named(strategy, others)
+    if _cuts_nox(chosen):
         require_nox(case.car, f"strategy {strategy}")
     plan, trajectory, solve_s = case.dp_plan, case.dp_trajectory, case.dp_s
     if strategy != "dp":
-        settings = _told(case, strategy, horizon_s)
+        settings = _told(case, chosen, horizon_s)
         began = perf_counter()
-        plan = strategy_named(strategy).solve(case.problem, **settings)
+        plan = chosen.solve(case.problem, **settings)
         solve_s = perf_counter() - began
         trajectory = simulate(case.problem, plan.control)
     row = row_of(case, strategy, trajectory, solve_s)
@@ -47,9 +55,8 @@ def run_case(
     return row, plan, trajectory
 
 
-def _told(case: Case, strategy: str, horizon_s: float | None) -> dict[str, Any]:
+def _told(case: Case, chosen: Strategy, horizon_s: float | None) -> dict[str, Any]:
     """What a strategy is told beyond the problem: its preview, the shipped cycles but this one to learn from."""
-    chosen = strategy_named(strategy)
     settings: dict[str, Any] = {}
     if chosen.previews and horizon_s is not None:
         settings["horizon_s"] = horizon_s
@@ -70,28 +77,36 @@ def _same_drive(one: Cycle, other: Cycle) -> bool:
     )
 
 
-def check_horizon(horizon_s: float | None, strategies: Iterable[str]) -> None:
+def check_horizon(
+    horizon_s: float | None,
+    strategies: Iterable[str],
+    others: Mapping[str, Strategy] = _NO_OTHERS,
+) -> None:
     """DataError for a preview that none of the strategies takes."""
-    if horizon_s is None or any(strategy_named(name).previews for name in strategies):
+    if horizon_s is None or any(strategy_named(name, others).previews for name in strategies):
         return
-    able = ", ".join(name for name, strategy in STRATEGIES.items() if strategy.previews)
+    able = ", ".join(name for name, strategy in every_strategy().items() if strategy.previews)
     raise DataError(
         f"horizon_s {horizon_s:g}: no strategy asked for looks ahead; add one that does ({able}), or leave it out"
     )
 
 
-def strategies_for(car: Architecture, wanted: Sequence[str] | None) -> list[str]:
+def strategies_for(
+    car: Architecture,
+    wanted: Sequence[str] | None,
+    others: Mapping[str, Strategy] = _NO_OTHERS,
+) -> list[str]:
     """The strategies to run on a car: those named, every one that fits it, or the usual ones that do.
 
     Without NOx data, only what is named cuts NOx. DataError for a name that is none.
     """
     if wanted is not None and list(wanted) != [EVERY]:
         for name in wanted:
-            strategy_named(name)
+            strategy_named(name, others)
         return list(wanted)
     names = fitting(car.functions, every=wanted is not None)
-    return [name for name in names if car.engine.nox_known or not _cuts_nox(name)]
+    return [name for name in names if car.engine.nox_known or not _cuts_nox(strategy_named(name))]
 
 
-def _cuts_nox(strategy: str) -> bool:
-    return "nox_cut" in strategy_named(strategy).needs
+def _cuts_nox(strategy: Strategy) -> bool:
+    return "nox_cut" in strategy.needs

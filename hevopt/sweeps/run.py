@@ -111,14 +111,17 @@ def plan_of(
     designs = designs_of(study)
     groups = groups_of(designs)
     found = jobs_of(
-        study.architecture, study.cycles, strategies, groups, allow_shortfall=study.allow_shortfall
-    )
+        study.architecture, study.cycles, strategies, groups,
+        allow_shortfall=study.allow_shortfall, brought=study.brought,
+    )  # fmt: skip
     jobs, planned = [], []
     for job, cases in found:
         jobs.append(job)
         planned += cases
         progress(len(jobs), len(groups) * len(study.cycles))
-    inputs = files_digests(cars_of(study, designs), map(load_cycle, study.cycles), [study.source])
+    inputs = files_digests(
+        cars_of(study, designs), map(load_cycle, study.cycles), [study.source, *study.files]
+    )
     return Plan(study, designs, jobs, planned, inputs)
 
 

@@ -106,7 +106,8 @@ class Collector:
             inputs=digests_shown(files_digests(cars, cycles, others)),
             versions=versions(),
             operations=list(OPERATIONS),
-            causal=[name for name, strategy in STRATEGIES.items() if strategy.causal],
+            causal=[name for name, strategy in STRATEGIES.items() if strategy.causal]
+            + sorted(comparison.causal - STRATEGIES.keys()),
             cars=self._cars,
             rows=[
                 Row(

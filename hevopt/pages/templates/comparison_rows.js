@@ -11,8 +11,12 @@ const Look = (() => {
     HATCHES: ["", "/", "\\", "x", ".", "-", "|", "+", "", "/"],
     DASHES: ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"],
     SYMBOLS: ["circle", "square", "diamond", "triangle-up", "triangle-down", "x", "cross", "star"],
-    // A strategy looks the same in every comparison.
-    styleOf: (strategy) => (FAMILIES.includes(strategy) ? FAMILIES.indexOf(strategy) : FAMILIES.length - 1),
+    // A shipped strategy looks the same in every comparison; others follow in the order of their rows.
+    styleOf: (strategy) => {
+      if (FAMILIES.includes(strategy)) return FAMILIES.indexOf(strategy);
+      const names = Shown.results.rows.map((row) => row.figures.strategy);
+      return FAMILIES.length + [...new Set(names)].filter((name) => !FAMILIES.includes(name)).indexOf(strategy);
+    },
     nameOf: (row) => `${row.figures.architecture} ${row.figures.strategy}`,
     // Names as an axis or a legend has room for them; in full in tables and where the mouse rests.
     short,
@@ -63,8 +67,8 @@ const AllRows = (() => {
         const n = styleOf(strategy);
         data.push({
           type: "bar", name: plain(strategy), x: own.map((s) => s.x), y: own.map((s) => value(s.row.figures)), width: 0.86,
-          marker: { color: look.colours[n], line: { color: look.ink, width: 0.6 },
-            pattern: { shape: HATCHES[n], fillmode: "overlay", fgcolor: look.hatch, size: 6, solidity: 0.35 } },
+          marker: { color: look.colours[n % 10], line: { color: look.ink, width: 0.6 },
+            pattern: { shape: HATCHES[(n + 3 * Math.floor(n / 10)) % 10], fillmode: "overlay", fgcolor: look.hatch, size: 6, solidity: 0.35 } },
           customdata: own.map((s) => plain(nameOf(s.row))), hovertemplate: "%{customdata}: %{y:+.2f} %<extra></extra>",
         });
       }

@@ -4,7 +4,7 @@ A job is one car on one cycle: its control table is built once for all strategie
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -30,11 +30,23 @@ class Case(NamedTuple):
     strategy: str
 
 
+class Brought(NamedTuple):
+    """What a worker needs of a strategy from outside.
+
+    reference: see `strategies.brought.located`; source: SHA-256 of the file it stands in; learns: see `Strategy`
+    """
+
+    reference: str
+    source: str
+    learns: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """A car, as an architecture with changed keys, on a cycle, and the cases to solve on it.
 
     inputs: digest of what the files held when the keys were made; None for whatever they hold
+    brought: name -> strategies from outside, of which its process knows nothing but this
     """
 
     architecture: str
@@ -43,6 +55,7 @@ class Job:
     allow_shortfall: bool
     cases: tuple[Case, ...]
     inputs: str | None = None
+    brought: Mapping[str, Brought] = field(default_factory=dict)
 
 
 class Ending(StrEnum):
@@ -114,6 +127,9 @@ def _cycle_digest(cycle: Cycle) -> str:
     return digest(cycle_contents(cycle))
 
 
+_NONE_BROUGHT: Mapping[str, Brought] = {}
+
+
 def jobs_of(
     architecture: str,
     cycles: Sequence[str],
@@ -121,6 +137,7 @@ def jobs_of(
     groups: Iterable[tuple[Mapping[str, Any], Sequence[tuple[int, float]]]],
     *,
     allow_shortfall: bool = False,
+    brought: Mapping[str, Brought] = _NONE_BROUGHT,
 ) -> Iterator[tuple[Job, list[Planned]]]:
     """A job per car and cycle, with the designs that its cases belong to.
 
@@ -134,11 +151,14 @@ def jobs_of(
 
     common = {"code": physics_digest(), "versions": versions(), "allow_shortfall": allow_shortfall}
     traces = {cycle: load_cycle(cycle) for cycle in cycles}
-    learning = {name for name, strategy in STRATEGIES.items() if strategy.learns}.intersection(
-        strategies
-    )
+    known = STRATEGIES | brought
+    learning = {name for name in strategies if name in known and known[name].learns}
     teachers = [cycle_contents(cycle) for cycle in shipped_cycles()] if learning else None
-    taught = {name: [digest(teachers)] for name in learning}
+    made_with = {name: [digest(teachers)] for name in learning}
+    for name in brought.keys() & set(strategies):
+        function = brought[name].reference.rpartition(":")[2]
+        made_with[name] = [*made_with.get(name, ()), function, brought[name].source]
+    own = {name: brought[name] for name in strategies if name in brought}
     for changes, members in groups:
         car = load_architecture(architecture, changes)
         heaviest = max(weight for _, weight in members)
@@ -152,9 +172,9 @@ def jobs_of(
             for design, given in members:
                 weight = float(given)
                 for strategy in strategies:
-                    key = digest([made_of, weight, strategy, *taught.get(strategy, ())])
+                    key = digest([made_of, weight, strategy, *made_with.get(strategy, ())])
                     cases[weight, strategy] = Case(key, weight, strategy)
                     planned.append(Planned(design, cycle, strategy, weight, key))
             solved = tuple(cases.values())
-            job = Job(architecture, changes, cycle, allow_shortfall, solved, inputs)
+            job = Job(architecture, changes, cycle, allow_shortfall, solved, inputs, own)
             yield job, planned

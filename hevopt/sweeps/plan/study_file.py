@@ -1,12 +1,14 @@
 """The file of a sweep: a car, cycles, strategies and parameters, checked in full before anything runs.
 
 `[parameters]` gives each key path of the architecture (`machine.power_max_w`), or `nox_weight`, a list of values
-or a range `{ from, to, count, log }`. A component and keys of it can both be parameters where these are quoted:
-`engine = [...]` and `"engine.idle_rpm" = [...]`. Paths in the file are relative to it; names mean shipped files.
+or a range `{ from, to, count, log }`. A component and keys of it can both be parameters
+where these are quoted: `engine = [...]` and `"engine.idle_rpm" = [...]`. A strategy of one's own is named by
+FILE.py:FUNCTION or MODULE:FUNCTION, which every worker runs. Paths in the file are relative to it; names mean
+shipped files.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,11 +18,11 @@ from pydantic import Field
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import COMPONENTS, load_architecture
 from hevopt.driving.cycle import load_cycle
-from hevopt.errors import DataError, unknown_name
+from hevopt.errors import DataError
 from hevopt.files.lookup import find, is_path
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, faults_of, good_keys, read_contents
-from hevopt.strategies import STRATEGIES, fitting
+from hevopt.sweeps.plan.brought import Brought, brought_of
 from hevopt.sweeps.plan.constraints import Constraint, parse
 from hevopt.sweeps.plan.jobs import BOUND
 from hevopt.sweeps.plan.parameters import (
@@ -65,6 +67,7 @@ class SweepStudy:
     source: the study file; architecture, cycles: names of shipped files, or absolute paths
     parameters: key path of the architecture, or `nox_weight`, -> its values, in order and as written
     sample: None for every combination
+    brought: name -> what a worker needs of a strategy from outside; files: in which these stand
     """
 
     source: Path
@@ -75,6 +78,8 @@ class SweepStudy:
     parameters: Mapping[str, Values]
     sample: SampleFile | None
     constraints: tuple[Constraint, ...]
+    brought: Mapping[str, Brought]
+    files: tuple[Path, ...]
 
 
 def read_study(path: str | Path) -> SweepStudy:
@@ -95,7 +100,9 @@ def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
     parameters = _parameters(good.get("parameters", {}), "sample" in contents, faults)
     architecture, car = _car(folder, good.get("architecture"), faults)
     cycles = _cycles(folder, good.get("cycles", ()), faults)
-    faults += _strategy_faults(good.get("strategies", ()), car)
+    strategies = good.get("strategies", ())
+    brought, files, found = brought_of(dict.fromkeys(strategies), folder, car, [BOUND])
+    faults += found + _twice("strategies", strategies)
     if car is not None:
 
         def load(changes: Mapping[str, Any]) -> Architecture:
@@ -110,7 +117,7 @@ def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
     data = StudyFile.model_validate(contents)
     return SweepStudy(
         path, architecture, cycles, tuple(data.strategies), data.allow_shortfall,
-        parameters, data.sample, constraints,
+        parameters, data.sample, constraints, brought, tuple(files),
     ), []  # fmt: skip
 
 
@@ -201,18 +208,6 @@ def _located(kind: str, name: str, suffix: str, folder: Path) -> str:
     if not is_path(name, suffix):
         return name
     return str(find(kind, name, suffix, beside=folder).absolute())
-
-
-def _strategy_faults(names: Sequence[str], car: Architecture | None) -> Iterator[str]:
-    """What is wrong with the strategies; of a car that has faults itself, any may fit."""
-    known = [*(fitting(car.functions, every=True) if car else STRATEGIES), BOUND]
-    for name in names:
-        if name in STRATEGIES and name not in known:
-            yield f"strategies: {name} does not fit {car.name}; allowed: {', '.join(known)}"
-        elif name not in known:
-            error = unknown_name("strategy", printable(name), known)
-            yield f"strategies: {error}"
-    yield from _twice("strategies", names)
 
 
 def _parameters(given: Mapping[str, Any], sampled: bool, faults: list[str]) -> dict[str, Values]:

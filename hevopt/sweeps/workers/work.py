@@ -1,6 +1,6 @@
 """What a worker does with a job: build the control table once, solve every case on it, never raise."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import lru_cache
 from math import isfinite
@@ -17,11 +17,14 @@ from hevopt.errors import DataError, InfeasibleError, SolverError
 from hevopt.files.lookup import find
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
+from hevopt.strategies import Strategy, brought
+from hevopt.strategies.brought import located
 from hevopt.studies.case import Case as SolvedCase
 from hevopt.studies.case import dp_case, require_nox
 from hevopt.studies.rows import Row, shortfall_steps
 from hevopt.studies.solved import run_case
 from hevopt.studies.status import Status
+from hevopt.sweeps.plan.brought import source_digest
 from hevopt.sweeps.plan.jobs import (
     BOUND,
     FIGURES,
@@ -66,6 +69,7 @@ class _Bench:
         self.job = job
         self._built: tuple[Architecture, Cycle, Problem] | None = None
         self._solved: dict[float, SolvedCase] = {}
+        self._brought: dict[str, Strategy] = {}
 
     def row(self, case: Case) -> dict[str, Any]:
         """A case's row as an outcome holds it."""
@@ -88,7 +92,19 @@ class _Bench:
             return _bound_row(car, cycle, problem.with_nox_weight(weight))
         if weight not in self._solved:
             self._solved[weight] = dp_case(car, cycle, problem.with_nox_weight(weight), _TARGET_GAP)
-        return _strategy_row(self._solved[weight], case.strategy)
+        return _strategy_row(self._solved[weight], case.strategy, self._others(case.strategy))
+
+    def _others(self, name: str) -> Mapping[str, Strategy]:
+        """The strategies from outside that a case needs; DataError where one is not what was planned."""
+        if name in self.job.brought and name not in self._brought:
+            own = self.job.brought[name]
+            place = located(own.reference)
+            if source_digest(place.file) != own.source:
+                raise DataError(
+                    f"{place.file}, the strategy {name}, changed after the sweep began; run the same command again"
+                )
+            self._brought[name] = brought(name, place, learns=own.learns)
+        return self._brought
 
 
 def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, Any]:
@@ -105,8 +121,10 @@ def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, A
     return _stored(row, None, row.bound_l_per_100km)
 
 
-def _strategy_row(solved: SolvedCase, strategy: str) -> dict[str, Any]:
-    row, _, trajectory = run_case(solved, strategy)
+def _strategy_row(
+    solved: SolvedCase, strategy: str, others: Mapping[str, Strategy]
+) -> dict[str, Any]:
+    row, _, trajectory = run_case(solved, strategy, others=others)
     surplus_j = trajectory.end_j - solved.problem.end_min_j
     worth_kg = solved.certificate.price_kgpj * surplus_j
     bound_kg, _ = solved.certificate.bound_of(trajectory)

@@ -1,0 +1,129 @@
+"""A plan made step by step: what a rule sees of the present, and the loop that drives it with the true battery."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.errors import DataError, InfeasibleError
+from hevopt.problem import battery as battery_model
+from hevopt.problem._battery_kernels import trace
+from hevopt.problem.problem import Plan, Problem
+
+Array = NDArray[np.float64]
+
+
+class Step(NamedTuple):
+    """The present step, as a rule sees it; nothing of what comes.
+
+    k: its number; time_s: when it begins; step_s: how long it is
+    soc, energy_j: state of charge and stored energy; mode: what the last control left
+    usable: (control,) whether it can be taken here: not rejected, its switch allowed, the charge kept in its window
+    fuel_kg, nox_kg: (control,) in this step, switch_fuel_kg: (control,) for the switch that leads there
+    battery_power_w: (control,) at the terminals, > 0 discharges; engine_on: (control,)
+    speed_mps, wheel_power_w, gear: of the car; NaN, NaN and 0 where the table has no signals
+    """
+
+    k: int
+    time_s: float
+    step_s: float
+    soc: float
+    energy_j: float
+    mode: int
+    usable: NDArray[np.bool_]
+    fuel_kg: Array
+    nox_kg: Array
+    switch_fuel_kg: Array
+    battery_power_w: Array
+    engine_on: NDArray[np.bool_]
+    speed_mps: float
+    wheel_power_w: float
+    gear: int
+
+
+def stepwise(problem: Problem, decide: Callable[[Step], int]) -> Plan:
+    """The plan of a rule that is asked at every step for the index of a control.
+
+    Raises InfeasibleError at the first step that leaves no usable control, DataError where the rule gives another.
+    """
+    table, pack = problem.table, problem.battery
+    engine_on = np.array([control.engine_on for control in table.controls])
+    arrays, window_j = pack.arrays, pack.granted_window_j
+    control = np.empty(len(table.time_s), dtype=np.int64)
+    mode, energy_j = problem.start_mode, problem.start_j
+    for k in range(len(control)):
+        now = _step(problem, k, mode, energy_j, window_j, engine_on)
+        if not now.usable.any():
+            raise InfeasibleError(
+                f"at {_place(now)} no control is left: each is rejected, needs a forbidden switch or takes the "
+                f"charge out of its window (SOC {now.soc:.4f})"
+            )
+        control[k] = _checked(now, decide(now))
+        mode = int(table.mode[control[k]])
+        power_w = table.battery_power_w[k, control[k]]
+        energy_j = float(trace(energy_j, np.array([power_w]), table.step_s[k : k + 1], arrays)[-1])
+    return Plan(control)
+
+
+def _step(
+    problem: Problem,
+    k: int,
+    mode: int,
+    energy_j: float,
+    window_j: tuple[float, float],
+    engine_on: NDArray[np.bool_],
+) -> Step:
+    table, pack = problem.table, problem.battery
+    soc, voltage, discharge, charge = battery_model.states(pack, energy_j)
+    power_w = table.battery_power_w[k]
+    chemical_w = battery_model.chemical_power_w(
+        pack, power_w, voltage, np.where(power_w < 0, charge, discharge)
+    )
+    after_j = energy_j - table.step_s[k] * chemical_w
+    signals = table.signals
+    return Step(
+        k=k,
+        time_s=float(table.time_s[k]),
+        step_s=float(table.step_s[k]),
+        soc=float(soc),
+        energy_j=energy_j,
+        mode=mode,
+        # NaN, a power beyond what the voltage delivers, is outside.
+        usable=table.feasible[k]
+        & table.switch_allowed[mode, table.mode]
+        & (after_j >= window_j[0])
+        & (after_j <= window_j[1]),
+        fuel_kg=table.fuel_kg[k],
+        nox_kg=table.nox_kg[k],
+        switch_fuel_kg=table.switch_fuel_kg[mode, table.mode],
+        battery_power_w=power_w,
+        engine_on=engine_on,
+        speed_mps=np.nan if signals is None else float(signals.speed_mps[k]),
+        wheel_power_w=np.nan if signals is None else float(signals.wheel_power_w[k]),
+        gear=0 if signals is None else int(signals.gear[k]),
+    )
+
+
+def _checked(now: Step, chosen: int) -> int:
+    """The index of a usable control that a rule chose."""
+    controls = len(now.usable)
+    try:
+        index = int(chosen)
+        whole = index == chosen and not isinstance(chosen, bool | np.bool_)
+    except (TypeError, ValueError, OverflowError):
+        whole = False
+    if not whole:
+        raise DataError(
+            f"the rule chose {chosen!r} at {_place(now)}; needed: the index of a control, 0 to {controls - 1}"
+        )
+    if not 0 <= index < controls or not now.usable[index]:
+        raise DataError(
+            f"the rule chose control {index} at {_place(now)}, which cannot be used there; choose among "
+            f"np.flatnonzero(now.usable), {int(now.usable.sum())} of {controls}"
+        )
+    return index
+
+
+def _place(now: Step) -> str:
+    return f"step {now.k} (t = {now.time_s:g} s)"
