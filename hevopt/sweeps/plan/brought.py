@@ -2,7 +2,7 @@
 
 import ast
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from hevopt.car.architecture import Architecture
@@ -48,7 +48,7 @@ def _place(
     name: str, folder: Path, fit: list[str], car: Architecture | None
 ) -> tuple[Located, bool]:
     """Where a strategy stands, and whether it learns; DataError where no worker could import it."""
-    known: Mapping = every_strategy()
+    known = every_strategy()
     if name in known and name not in fit and car is not None:
         raise DataError(f"{name} does not fit {car.name}; allowed: {', '.join(fit)}")
     if name in known:

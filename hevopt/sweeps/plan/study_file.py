@@ -22,9 +22,9 @@ from hevopt.errors import DataError
 from hevopt.files.lookup import find, is_path
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, faults_of, good_keys, read_contents
-from hevopt.sweeps.plan.brought import Brought, brought_of
+from hevopt.sweeps.plan.brought import brought_of
 from hevopt.sweeps.plan.constraints import Constraint, parse
-from hevopt.sweeps.plan.jobs import BOUND
+from hevopt.sweeps.plan.jobs import BOUND, Brought
 from hevopt.sweeps.plan.parameters import (
     DESIGNS_MAX,
     Range,
