@@ -151,7 +151,8 @@ def unit_named(text: str) -> Unit | None:
 
 
 def _tables() -> tuple[dict[str, Unit], dict[str, Unit | None]]:
-    exact, any_case = {}, {}
+    exact: dict[str, Unit] = {}
+    any_case: dict[str, Unit | None] = {}
     for quantity, spelled in _SPELLINGS.items():
         for spellings, si in spelled.items():
             unit = Unit(spellings.split()[0], quantity, si)

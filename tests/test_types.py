@@ -11,9 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 # Rooms with faults left, and how many mypy finds in each today: lower or strike a number, never raise it.
 OPEN = {
-    "forward": 42,
-    "measured": 208, "sweeps": 65, "pages": 64, "car_files": 33, "commands": 28, "powertrain": 19,
-    "reproduction": 16, "files": 14, "studies": 8, "driving": 6, "car": 5, "checks": 4, "units": 1, "output": 1,
+    "measured": 208, "pages": 64, "sweeps": 63, "forward": 42, "reproduction": 16, "studies": 8, "powertrain": 7,
 }  # fmt: skip
 
 

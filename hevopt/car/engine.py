@@ -84,9 +84,10 @@ class Engine(Shown):
         efficiency = np.where(np.isfinite(efficiency), efficiency, -1.0)
         best, known = np.argmax(efficiency, axis=1), (efficiency >= 0).any(axis=1)
         known |= ~known.any()
-        return np.interp(
+        best_nm: Array = np.interp(
             speed_radps, speeds[known, 0], torques[np.arange(len(speeds)), best][known]
         )
+        return best_nm
 
     def scaled(self, factor: float) -> "Engine":
         """The engine with `factor` times the displacement, at equal mean pressures and piston speeds."""

@@ -4,6 +4,8 @@ A cell with four measured corners is interpolated bilinearly; one with three, li
 three, its other half being outside. The two agree on the edges that they share.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +28,7 @@ def interpolated(
     speed, torque = np.broadcast_arrays(speed_radps, torque_nm)
     i, x = _place(grid_speed_radps, speed)
     j, y = _place(grid_torque_nm, torque)
-    corners = (
+    corners: tuple[tuple[Array, Array], ...] = (
         (values[i, j], (1 - x) * (1 - y)),
         (values[i, j + 1], (1 - x) * y),
         (values[i + 1, j], x * (1 - y)),
@@ -37,7 +39,9 @@ def interpolated(
         # A corner that was not measured spoils only what leans on it.
         result += np.where(weight == 0, 0.0, weight * corner)
     if np.isnan(values).any():
-        result = np.where(np.isnan(result), _on_triangle(*(c for c, _ in corners), x, y), result)
+        result = np.where(
+            np.isnan(result), _on_triangle([corner for corner, _ in corners], x, y), result
+        )
     return np.where(_beyond(x) | _beyond(y), np.nan, result)
 
 
@@ -69,7 +73,8 @@ def highest_known(
 
 
 def _last(where: NDArray[np.bool_]) -> NDArray[np.int64]:
-    return where.shape[-1] - 1 - np.argmax(where[..., ::-1], axis=-1)
+    last: NDArray[np.int64] = where.shape[-1] - 1 - np.argmax(where[..., ::-1], axis=-1)
+    return last
 
 
 def _at(where: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -86,8 +91,9 @@ def _beyond(share: Array) -> NDArray[np.bool_]:
     return np.abs(share - 0.5) > 0.5 + _ROUNDING
 
 
-def _on_triangle(low: Array, up: Array, right: Array, far: Array, x: Array, y: Array) -> Array:
+def _on_triangle(corners: Sequence[Array], x: Array, y: Array) -> Array:
     """Linear on the three known corners: (0, 0) low, (0, 1) up, (1, 0) right, (1, 1) far; else NaN."""
+    low, up, right, far = corners
     result = np.full(x.shape, np.nan)
     # The corner opposite the missing one, its two neighbours, and the distances from it along x and y.
     for opposite, along_x, along_y, u, v in (

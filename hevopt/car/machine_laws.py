@@ -121,7 +121,8 @@ class LossMap(Shown):
             np.where(passes, before - after, np.nan), first, -1
         )
         start, end = (np.take_along_axis(t, first, -1) for t in (torque[..., :-1], torque[..., 1:]))
-        return (start + part * (end - start))[..., 0]
+        root: Array = (start + part * (end - start))[..., 0]
+        return root
 
     def scaled(self, factor: float) -> "LossMap":
         """The same map with torques and losses multiplied."""

@@ -63,9 +63,11 @@ def gears_from_shift_speeds(
             current -= 1
         gear[k] = current
     clutch_open = np.zeros(steps, dtype=bool)
-    for k in np.flatnonzero(moving[1:] & ~moving[:-1]):
-        launch_s = time_s[k + 1]
-        waiting = ~moving[: k + 1] & (time_s[: k + 1] >= launch_s - gearbox.engage_before_launch_s)
-        gear[: k + 1][waiting] = 1
-        clutch_open[: k + 1][waiting] = True
+    for rest in np.flatnonzero(moving[1:] & ~moving[:-1]):
+        launch_s = time_s[rest + 1]
+        waiting = ~moving[: rest + 1] & (
+            time_s[: rest + 1] >= launch_s - gearbox.engage_before_launch_s
+        )
+        gear[: rest + 1][waiting] = 1
+        clutch_open[: rest + 1][waiting] = True
     return gear, clutch_open

@@ -1,6 +1,6 @@
 """What an architecture's file may hold: the components it names, its functions and the coupling."""
 
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, model_validator
 
@@ -49,7 +49,7 @@ class CouplingFile(FileModel):
     machine_shift_fuel_g: Annotated[float, Field(ge=0, le=10)] = 0.0
 
     @model_validator(mode="after")
-    def _keys_of_kind(self):
+    def _keys_of_kind(self) -> Self:
         _KEYS_OF_KIND.check(self.kind, self.model_fields_set)
         return self
 

@@ -1,6 +1,6 @@
 """What a battery's file may hold: cells in series, their voltage and resistance, the window of their charge."""
 
-from typing import Annotated
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -35,7 +35,7 @@ class SocFile(FileModel):
     end: Soc | None = None
 
     @model_validator(mode="after")
-    def _window(self):
+    def _window(self) -> Self:
         if not self.min < self.max:
             raise ValueError(f"empty window: min {self.min:g} must be below max {self.max:g}")
         if not self.min <= self.start <= self.max:
@@ -70,7 +70,7 @@ class BatteryFile(FileModel):
     soc: SocFile
 
     @model_validator(mode="after")
-    def _curves(self):
+    def _curves(self) -> Self:
         given = self.model_fields_set & {"resistance_ohm", "discharge_ohm", "charge_ohm"}
         if given not in ({"resistance_ohm"}, {"discharge_ohm", "charge_ohm"}):
             raise ValueError(
@@ -80,15 +80,16 @@ class BatteryFile(FileModel):
         lists = [v for v in (self.open_circuit_v, *self.resistances()) if isinstance(v, list)]
         if lists and self.curve_soc is None:
             raise ValueError("values over SOC need curve_soc")
-        if any(len(v) != len(self.curve_soc) for v in lists):
-            raise ValueError(f"values over SOC need {len(self.curve_soc)} entries, as curve_soc")
-        if self.curve_soc is not None and (
-            len(self.curve_soc) < 2 or (np.diff(self.curve_soc) <= 0).any()
-        ):
+        points = self.curve_soc
+        if points is None:
+            return self
+        if any(len(v) != len(points) for v in lists):
+            raise ValueError(f"values over SOC need {len(points)} entries, as curve_soc")
+        if len(points) < 2 or (np.diff(points) <= 0).any():
             raise ValueError("curve_soc must increase and have at least 2 entries")
         return self
 
-    def resistances(self) -> tuple:
+    def resistances(self) -> tuple[Any, Any]:
         """Discharge and charge resistance as given."""
         if self.resistance_ohm is not None:
             return self.resistance_ohm, self.resistance_ohm

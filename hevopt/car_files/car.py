@@ -1,6 +1,6 @@
 """What a car's file may hold: mass, wheels, auxiliaries and road load."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -37,7 +37,7 @@ class RoadLoadFile(FileModel):
     coastdown_mass_kg: Mass | None = None
 
     @model_validator(mode="after")
-    def _one_form(self):
+    def _one_form(self) -> Self:
         coastdown = {key for key in self.model_fields_set if key.startswith("coastdown")}
         parts = self.model_fields_set - coastdown
         whole = _FORMS[0] <= parts or _FORMS[1] <= coastdown

@@ -39,14 +39,13 @@ def vehicle_of(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
             air = (0.0, *air[1:])
     else:
         weight_n = mass_kg * STANDARD_GRAVITY_MPS2
-        polynomial = (
-            load.rolling_c0,
-            load.rolling_c1_spm,
-            load.rolling_c2_s2pm2,
-            load.rolling_c3_s3pm3,
+        rolling = (
+            weight_n * (load.rolling_c0 or 0.0),
+            weight_n * load.rolling_c1_spm,
+            weight_n * load.rolling_c2_s2pm2,
+            weight_n * load.rolling_c3_s3pm3,
         )
-        rolling = tuple(weight_n * c for c in polynomial)
-        air = (0.0, 0.0, load.air_density_kgpm3 / 2 * load.drag_area_m2, 0.0)
+        air = (0.0, 0.0, load.air_density_kgpm3 / 2 * (load.drag_area_m2 or 0.0), 0.0)
     return Vehicle(
         car.name,
         mass_kg,
@@ -88,13 +87,14 @@ def _engine_map(data: EngineGridFile) -> EngineMap:
 
 
 def _compact_law(data: EngineFile) -> CompactLaw:
-    nox = data.nox_coefficients
+    fuel, nox = data.fuel_coefficients, data.nox_coefficients
+    assert fuel is not None  # an engine file without a map has them, as its check makes sure
     return CompactLaw(
         displacement_m3=data.displacement_cm3 * TO_SI["_cm3"][1],
         stroke_m=data.stroke_mm * TO_SI["_mm"][1],
         heating_value_jpkg=data.fuel.heating_value_mjpkg * TO_SI["_mjpkg"][1],
         speed_max_radps=data.full_load.speed_rpm[-1] * TO_SI["_rpm"][1],
-        fuel=FuelCoefficients(**data.fuel_coefficients.model_dump()),
+        fuel=FuelCoefficients(**fuel.model_dump()),
         nox=None if nox is None else NoxCoefficients(**nox.model_dump()),
     )
 
@@ -134,7 +134,8 @@ def _loss_law(data: MachineFile) -> LossLaw:
         return _loss_map(data.loss_map)
     if data.efficiency is not None:
         return LossByEfficiency(data.efficiency)
-    return LossByCoefficients(data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
+    given = (data.loss_c0_w, data.loss_c1_ws, data.loss_c2_ws2, data.loss_c3_wpnm2)
+    return LossByCoefficients(*(coefficient or 0.0 for coefficient in given))
 
 
 def _torque_curve(data: FullLoadFile) -> TorqueCurve:
@@ -156,7 +157,7 @@ def battery_of(data: BatteryFile) -> Battery:
     points = np.array(data.curve_soc or [0.0, 1.0])
     voltage = data.open_circuit_v
     if isinstance(voltage, LinearVoltageFile):
-        voltage = voltage.intercept + voltage.slope * points
+        voltage = list(voltage.intercept + voltage.slope * points)
     discharge, charge = (np.broadcast_to(r, points.shape) * cells for r in data.resistances())
     power_max_w = (data.power_max_w or inf) * cells
     current_max_a = data.current_max_a or inf

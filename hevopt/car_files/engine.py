@@ -1,7 +1,7 @@
 """What an engine's file may hold: sizes, fuel, full load, and fuel and NOx by coefficients or a measured map."""
 
 from math import pi
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -59,7 +59,7 @@ class EngineGridFile(FileModel):
     motoring_torque_nm: Curve
 
     @model_validator(mode="after")
-    def _shapes(self):
+    def _shapes(self) -> Self:
         shape = (len(self.speed_rpm), len(self.torque_nm))
         for name in ("fuel_gps", "nox_gps"):
             grid = getattr(self, name)
@@ -92,7 +92,7 @@ class EngineFile(FileModel):
     scale: EngineScaleFile | None = None
 
     @model_validator(mode="after")
-    def _one_map(self):
+    def _one_map(self) -> Self:
         if (self.fuel_coefficients is None) == (self.fuel_map is None):
             raise ValueError("give either fuel_coefficients or fuel_map")
         if self.fuel_map is not None and self.nox_coefficients is not None:
@@ -105,7 +105,7 @@ class EngineFile(FileModel):
         return self
 
     @model_validator(mode="after")
-    def _fuel_at_every_speed(self):
+    def _fuel_at_every_speed(self) -> Self:
         """The p_mf equation (engine.py) has a root, and rising fuel, up to full load and top speed."""
         if self.fuel_coefficients is None:
             return self
@@ -129,7 +129,7 @@ class EngineFile(FileModel):
         return self
 
     @model_validator(mode="after")
-    def _nox_steepness(self):
+    def _nox_steepness(self) -> Self:
         k = self.nox_coefficients
         if k is not None:
             tops = [k.p0 + k.p1 * (rpm / 1000 - 2) for rpm in (0.0, self.full_load.speed_rpm[-1])]

@@ -5,7 +5,7 @@ Keys carry their unit as a suffix; bounds are wide where physics sets none, and 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
@@ -97,7 +97,7 @@ class ScaleFile(FileModel):
     power: ScaleFactor | None = None
 
     @model_validator(mode="after")
-    def _one_name(self):
+    def _one_name(self) -> Self:
         given = sorted(self.model_fields_set)
         if len(given) != 1:
             names = ", ".join(type(self).model_fields)
@@ -110,7 +110,7 @@ class ScaleFile(FileModel):
     @property
     def factor(self) -> float:
         """The factor given."""
-        return next(value for value in self.model_dump().values() if value is not None)
+        return float(next(value for value in self.model_dump().values() if value is not None))
 
 
 class FullLoadFile(FileModel):
@@ -120,7 +120,7 @@ class FullLoadFile(FileModel):
     torque_nm: Curve
 
     @model_validator(mode="after")
-    def _curve(self):
+    def _curve(self) -> Self:
         if len(self.speed_rpm) != len(self.torque_nm):
             raise ValueError("speed_rpm and torque_nm must have one length")
         if (np.diff(self.speed_rpm) <= 0).any():

@@ -1,6 +1,6 @@
 """What a gearbox's file may hold: ratios, efficiency, shift speeds, and the limits of a gear chosen freely."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -30,7 +30,7 @@ class GearboxFile(FileModel):
     free_gear: FreeGearFile | None = None
 
     @model_validator(mode="after")
-    def _lengths(self):
+    def _lengths(self) -> Self:
         gears, shifts = len(self.ratios), self.shift_speeds
         if isinstance(self.efficiency, list) and len(self.efficiency) != gears:
             raise ValueError(f"efficiency needs one value or {gears}, one per gear")
@@ -39,13 +39,13 @@ class GearboxFile(FileModel):
         return self
 
     @model_validator(mode="after")
-    def _falling(self):
+    def _falling(self) -> Self:
         if list(self.ratios) != sorted(self.ratios, reverse=True):
             raise ValueError("ratios must fall from first gear to last")
         return self
 
     @model_validator(mode="after")
-    def _no_hunting(self):
+    def _no_hunting(self) -> Self:
         shifts = self.shift_speeds
         if any(d >= u for u, d in zip(shifts.up_kmh, shifts.down_kmh, strict=False)):
             raise ValueError("each down_kmh must be below its up_kmh")

@@ -1,6 +1,6 @@
 """What an electric machine's file may hold: limits, and loss by efficiency, coefficients or a measured map."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
@@ -32,7 +32,7 @@ class LossMapFile(FileModel):
     symmetric: bool = False
 
     @model_validator(mode="after")
-    def _shapes(self):
+    def _shapes(self) -> Self:
         check_grid("loss_w", self.loss_w, len(self.speed_rpm), len(self.torque_nm))
         if (np.diff(self.speed_rpm) <= 0).any() or (np.diff(self.torque_nm) <= 0).any():
             raise ValueError("speed_rpm and torque_nm must increase")
@@ -73,7 +73,7 @@ class MachineFile(FileModel):
     scale: ScaleFile | None = None
 
     @model_validator(mode="after")
-    def _keys_of_kind(self):
+    def _keys_of_kind(self) -> Self:
         given = {key for key in self.model_fields_set if getattr(self, key) is not None}
         _KEYS_OF_KIND.check(self.kind, given)
         return self

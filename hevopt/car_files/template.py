@@ -51,12 +51,13 @@ def new_files(
     _check_name(name, out)
     copied = _wanted(components)
     original = load_architecture(like).source
-    contents, texts, references = read_contents(original), {}, {}
+    contents, texts = read_contents(original), {}
+    references: dict[str, str | dict[str, Any]] = {}
     for key in COMPONENTS:
         found = component_contents(original, key, contents[key], {})
         if key in copied:
-            references[key] = f"{name}_{key}"
-            target = out.parent / "components" / f"{references[key]}.toml"
+            references[key] = own = f"{name}_{key}"
+            target = out.parent / "components" / f"{own}.toml"
             texts[target] = _component_text(name, key, found.file, found.contents)
         else:
             references[key] = _reference(contents[key], found.file, out.parent)
@@ -169,7 +170,11 @@ def _kept(original: Path, notes: Notes) -> list[str]:
 
 
 def _table_lines(
-    model: str, contents: Mapping[str, Any], notes: Notes, at: tuple[str, ...], tables: dict
+    model: str,
+    contents: Mapping[str, Any],
+    notes: Notes,
+    at: tuple[str, ...],
+    tables: dict[str, Any],
 ) -> list[str]:
     """A table's keys in the order of its model, its own values before the tables in it."""
     lines, sections = [], []
@@ -221,7 +226,7 @@ def _toml(value: Any) -> str:
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items()) + " }"
     if not isinstance(value, list):
-        return tomlkit.item(value).as_string()
+        return str(tomlkit.item(value).as_string())
     inner = [_toml(entry) for entry in value]
     if any(isinstance(entry, list) for entry in value):
         return "[\n" + "".join(f"  {row},\n" for row in inner) + "]"
@@ -238,7 +243,8 @@ def _key(key: str) -> str:
 
 def _notes(path: Path) -> Notes:
     """The comments of a TOML file by what they belong to, without those of `new_files`."""
-    notes, pending = Notes([], {}, {}), []
+    notes = Notes([], {}, {})
+    pending: list[str] = []
     try:
         document = tomlkit.parse(read_text(path, _MEGABYTES_MAX))
     except TOMLKitError as error:

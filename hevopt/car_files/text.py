@@ -37,7 +37,7 @@ def _keys(table: Mapping[str, Any], prefix: str, origins: Mapping[str, str]) -> 
     return lines
 
 
-def _list(key: str, values: list) -> list[str]:
+def _list(key: str, values: list[Any]) -> list[str]:
     if values and isinstance(values[0], list):
         rows = [f"    [{', '.join(map(_number, row))}]," for row in values]
         return [f"{key} = [", *rows, "]"]

@@ -6,7 +6,7 @@ What a TOML file is, is told by its keys: the kind that knows most of them.
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from hevopt.car_files.load import COMPONENTS, component_contents, load_architecture
 from hevopt.car_files.schema import MODELS
@@ -120,7 +120,7 @@ def architecture_faults(path: Path, contents: dict[str, Any], kind: str) -> tupl
     return [], f"{car.name}: {car.description}" if car.description else car.name
 
 
-def is_component(value: Any) -> bool:
+def is_component(value: Any) -> TypeGuard[str | dict[str, Any]]:
     """Whether a value names the file of a component."""
     named = isinstance(value, dict) and isinstance(value.get("file"), str)
     return isinstance(value, str) or named

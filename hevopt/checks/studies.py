@@ -1,6 +1,7 @@
 """Study files of compare and sweep checked in full, with every file that they name."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ def compare_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[lis
             faults += _named_faults(path, key, name, wanted)
     for name in names("strategies"):
         if name != EVERY:
-            faults += tried(path, "strategies", lambda name=name: strategy_named(name))
+            faults += tried(path, "strategies", partial(strategy_named, name))
     cars = names("architectures")
     good = not faults
     try:
@@ -98,9 +99,7 @@ def _settings_faults(path: Path, changes: Mapping[str, Any]) -> list[str]:
     faults = []
     for names in ([], *(groups[first] for first in sorted(groups))):
         part = study_of(shared | {name: given[name] for name in names})
-        faults += tried(
-            path, "settings", lambda part=part: cars_of(part.architectures, part.settings)
-        )
+        faults += tried(path, "settings", partial(cars_of, part.architectures, part.settings))
     return list(dict.fromkeys(faults))
 
 

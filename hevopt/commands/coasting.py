@@ -52,7 +52,7 @@ def coastdown(
     """C0, C1, C2 of the road load from coast-downs in both directions, with confidence intervals."""
     from hevopt.car_files.text import component_text
     from hevopt.files.writing import check_outs, write_whole
-    from hevopt.measured.coastdown.car import car_base, car_contents, check_mass, said_of_mass
+    from hevopt.measured.coastdown.car import car_base, car_contents, mass_of_test, said_of_mass
     from hevopt.measured.coastdown.fit import fit_road_load
     from hevopt.measured.coastdown.report import results
     from hevopt.measured.coastdown.runs import ROLES, ROLES_WITH_UNIT, read_runs
@@ -68,19 +68,19 @@ def coastdown(
         if value is not None
     }
     car = car_base(like, values, rotating_mass_kg)
-    check_mass(mass_kg)
+    tested_kg = mass_of_test(mass_kg)
     ways = None if directions is None else _ways(directions)
     columns = pairs("--column", column, ROLES)
     units = pairs("--unit", unit, ROLES_WITH_UNIT)
     runs, notes = read_runs(files, columns, units, ways, sheet)
-    fit = fit_road_load(runs, mass_kg + car.rotating_kg)
-    said = results(runs, fit, mass_kg, car.rotating_kg)
-    contents = None if out is None else car_contents(fit, car, mass_kg)
-    said += said_of_mass(mass_kg) if contents else []
+    fit = fit_road_load(runs, tested_kg + car.rotating_kg)
+    said = results(runs, fit, tested_kg, car.rotating_kg)
+    contents = None if out is None else car_contents(fit, car, tested_kg)
+    said += said_of_mass(tested_kg) if contents else []
     for note in notes:
         write(f"  {printable(note)}")
     write("\n".join(said))
-    if contents is not None:
+    if out is not None and contents is not None:
         head = [
             "Car with a road load from coast-downs, written by hevopt coastdown.",
             *digests(files),
@@ -91,7 +91,7 @@ def coastdown(
         write(f"car written to {out}")
     else:
         write(f"no {'car ' * (plot is not None)}file written; --out FILE writes the car")
-    if plot is not None:
+    if plot is not None and kind is not None:
         from hevopt.measured.coastdown.plot import coastdown_figure
 
         write_whole(plot, coastdown_figure(runs, fit, kind))

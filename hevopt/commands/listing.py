@@ -1,5 +1,6 @@
 """`hevopt architectures`, `cycles` and `strategies`: what there is to choose from."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -69,8 +70,7 @@ def strategies(
     with Progress() as progress:
         comparisons = [
             study.compare(
-                cycle, ["C2", "D"], ["all"], allow_shortfall=True,
-                progress=lambda text, done, total, c=cycle: progress(f"{c}, {text}", done, total),
+                cycle, ["C2", "D"], ["all"], allow_shortfall=True, progress=partial(progress.of, cycle)
             )
             for cycle in shipped_names("cycles", ".csv")
         ]  # fmt: skip

@@ -136,10 +136,10 @@ def _request(
     others = {}
     for role, text in extra.items():
         if text is not None:
-            path, mark, of_sheet = (text, "", "") if Path(text).exists() else text.partition("#")
+            path, mark, behind = (text, "", "") if Path(text).exists() else text.partition("#")
             own = {role: columns[role]} if role in columns else {}
             own = columns if Path(path) == file else own
-            of_sheet = of_sheet if mark else None
+            of_sheet = behind if mark else None
             others[role] = Source(Path(path), of_sheet, own, units, rows, extra=True)
     return Request(Source(file, sheet, columns, units, rows), others, like, values)
 

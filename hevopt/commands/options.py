@@ -10,7 +10,9 @@ from hevopt.commands.terminal import listed
 from hevopt.errors import DataError
 from hevopt.files.shown import shown
 
-CycleOption = Annotated[str | None, typer.Option("--cycle", help="Name or CSV file of a cycle.")]
+_CYCLE = typer.Option("--cycle", help="Name or CSV file of a cycle.")
+CycleOption = Annotated[str, _CYCLE]
+CycleGivenOption = Annotated[str | None, _CYCLE]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead.")]
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
 
@@ -83,7 +85,7 @@ def takes_settings(*without: str) -> Callable[[Callable[..., None]], Callable[..
             command(given=_as_in_a_file(given), **values)
 
         with_options.__name__, with_options.__doc__ = command.__name__, command.__doc__
-        with_options.__signature__ = inspect.Signature(parameters)
+        vars(with_options)["__signature__"] = inspect.Signature(parameters)
         with_options.__annotations__ = {p.name: p.annotation for p in parameters}
         return with_options
 

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOption, takes_settings
+from hevopt.commands.options import (
+    ArchitectureArgument,
+    CycleGivenOption,
+    CycleOption,
+    JsonOption,
+    takes_settings,
+)
 from hevopt.commands.terminal import Progress, listed, show, write
 
 _OPTIONS = "the command line"
@@ -22,7 +28,7 @@ def compare(
             metavar="STUDY", help="TOML file with the settings below; options go first."
         ),
     ] = None,
-    cycle: CycleOption = None,
+    cycle: CycleGivenOption = None,
     architectures: Annotated[
         str | None, typer.Option("--architectures", help="Names or files, separated by commas.")
     ] = None,

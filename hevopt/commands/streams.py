@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+from typing import Any
 
 
 class _Lasting(io.FileIO):
@@ -15,7 +16,7 @@ class _Lasting(io.FileIO):
         super().__init__(descriptor, "w", closefd=False)
         self._lost = False
 
-    def write(self, data: bytes) -> int | None:
+    def write(self, data: Any, /) -> int:
         if not self._lost:
             try:
                 return super().write(data)
@@ -39,9 +40,7 @@ def keep_streams() -> None:
     sys.stderr = _lasting(2, sys.stderr, sys.__stderr__, "backslashreplace")
 
 
-def _lasting(
-    descriptor: int, stream: io.TextIOWrapper | None, first: io.TextIOWrapper | None, errors: str
-) -> io.TextIOWrapper:
+def _lasting(descriptor: int, stream: Any, first: Any, errors: str) -> Any:
     if stream is not first:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors=errors)

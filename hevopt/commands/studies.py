@@ -146,7 +146,7 @@ def with_studies(
     from hevopt.pages.comparison.results import ParetoFront, Sensitivity
 
     wanted = [car for car in cars.cars if car.name in results.cars]
-    added: dict[str, list] = {"pareto": [], "sensitivity": []}
+    added: dict[str, list[Any]] = {"pareto": [], "sensitivity": []}
     failures: dict[str, HevoptError] = {}
     with Progress() as progress:
         for car in wanted if fronts else ():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hevopt.files.shown import printable, shown
 
 if TYPE_CHECKING:
+    from rich import progress as parts
     from rich.table import Table
 
     from hevopt.sweeps.run import Progress
@@ -30,7 +31,7 @@ class SweepProgress:
         from rich.console import Console
 
         self._console = Console(stderr=True)
-        self._bar, self._task = None, None
+        self._bar: parts.Progress | None = None
         self._said_s = monotonic()
         return self
 
@@ -62,10 +63,13 @@ class SweepProgress:
                 parts.BarColumn(), parts.MofNCompleteColumn(), parts.TextColumn("{task.fields[pace]}"),
                 console=self._console, refresh_per_second=4,
             )  # fmt: skip
-            self._task = self._bar.add_task("", total=progress.total, pace="")
+            self._bar.add_task("", total=progress.total, pace="")
             self._bar.start()
         self._bar.update(
-            self._task, completed=progress.done, total=progress.total, pace=_pace(progress)
+            self._bar.task_ids[0],
+            completed=progress.done,
+            total=progress.total,
+            pace=_pace(progress),
         )
 
     def finish(self) -> None:
@@ -88,7 +92,8 @@ def duration(seconds: float) -> str:
     """A time as one reads it: 42 s, 3 min 20 s, 5 h 2 min, 3 d 4 h."""
     if not isfinite(seconds) or seconds < 59.5:
         return f"{seconds:.2g} s" if seconds < 9.5 else f"{seconds:.0f} s"
-    parts, rest = [], round(seconds)
+    parts: list[str] = []
+    rest = round(seconds)
     for unit, size in (("d", 86400), ("h", 3600), ("min", 60), ("s", 1)):
         count, rest = divmod(rest, size)
         parts += [f"{count} {unit}"] if count or parts else []

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
+    from rich.status import Status
     from rich.table import Table
 
 _PROGRESS_AFTER_S = 2.0
@@ -41,13 +42,17 @@ class Progress:
 
     def __enter__(self) -> "Progress":
         self._began = self._said_s = monotonic()
-        self._status = None
+        self._status: Status | None = None
         return self
 
     def __call__(self, text: str, done: int, total: int) -> None:
         now = monotonic()
         if now - self._began > _PROGRESS_AFTER_S:
             self._say(f"{done} of {total} done, next {text}", now)
+
+    def of(self, what: str, text: str, done: int, total: int) -> None:
+        """The same for one of several runs."""
+        self(f"{what}, {text}", done, total)
 
     def _say(self, line: str, now: float) -> None:
         from rich.console import Console

@@ -38,6 +38,7 @@ DISTANCE_MIN_M = 1.0
 IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
 _OTHERS = (".xls", ".xlsx", ".mat", ".vdri", ".vbo", ".tsv")
 # Called with every fault found: line and text.
+_Values = NDArray[np.float64]
 _Tell = Callable[[int, str], None]
 # Plainer than Python's own: no underscores, no digits of other scripts.
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -186,8 +187,9 @@ def _rows(path: Path, text: str, tell: _Tell) -> tuple[list[str], list[tuple[int
                 "steps",
             )
             break
-        values = [_number(number, *pair, tell) for pair in zip(header, cells, strict=True)]
-        if None not in values:
+        read = [_number(number, *pair, tell) for pair in zip(header, cells, strict=True)]
+        values = [value for value in read if value is not None]
+        if len(values) == len(read):
             rows.append((number, values))
     if header is None:
         raise DataError(f"{path}: empty; expected a header line such as time_s,speed_kmh")
@@ -233,7 +235,14 @@ def _number(line: int, column: str, cell: str, tell: _Tell) -> float | None:
     return value
 
 
-def _check_time_and_speed(lines, time_s, speed_mps, column, factor, tell: _Tell) -> None:
+def _check_time_and_speed(
+    lines: list[int],
+    time_s: NDArray[np.float64],
+    speed_mps: NDArray[np.float64],
+    column: str,
+    factor: float,
+    tell: _Tell,
+) -> None:
     _check_range(lines, "time_s", time_s, -_TIME_MAX_S, _TIME_MAX_S, tell)
     steps_s = np.diff(time_s)
     for k in np.flatnonzero(steps_s <= 0) + 1:
@@ -267,13 +276,23 @@ def _check_time_and_speed(lines, time_s, speed_mps, column, factor, tell: _Tell)
         )
 
 
-def _check_range(lines, column, values, low, high, tell: _Tell) -> None:
+def _check_range(
+    lines: list[int],
+    column: str,
+    values: _Values,
+    low: float,
+    high: float,
+    tell: _Tell,
+) -> None:
     for k in np.flatnonzero((values < low) | (values > high)):
         tell(lines[k], f"{column} is {values[k]:g}; allowed: {low:g} to {high:g}")
 
 
-def _whole_numbers(lines, column, values, high, tell: _Tell) -> NDArray[np.int64]:
+def _whole_numbers(
+    lines: list[int], column: str, values: _Values, high: int, tell: _Tell
+) -> NDArray[np.int64]:
     _check_range(lines, column, values, 0, high, tell)
     for k in np.flatnonzero(values != np.round(values)):
         tell(lines[k], f"{column} is {values[k]:g}; a whole number is needed")
-    return np.clip(np.round(values), 0, high).astype(np.int64)
+    whole: NDArray[np.int64] = np.clip(np.round(values), 0, high).astype(np.int64)
+    return whole

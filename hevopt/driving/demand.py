@@ -60,7 +60,7 @@ def demand_of(cycle: Cycle, vehicle: Vehicle, gearbox: Gearbox) -> Demand:
     speed = (cycle.speed_mps[1:] + cycle.speed_mps[:-1]) / 2
     accel = np.diff(cycle.speed_mps) / step_s
     force = tractive_force_n(vehicle, speed, accel, cycle.grade[:-1])
-    if cycle.gear is None:
+    if cycle.gear is None or cycle.clutch_open is None:
         gear, clutch_open = gears_from_shift_speeds(gearbox, cycle.time_s, cycle.speed_mps)
     else:
         gear, clutch_open = cycle.gear[:-1], cycle.clutch_open[:-1]

@@ -33,7 +33,8 @@ def csv_of(table: "pd.DataFrame", *, header: bool = True) -> bytes:
         columns[name] = values
     names = csv_cells(map(printable, columns)) if header else False
     plain = pd.DataFrame(columns, index=table.index)
-    return plain.to_csv(index=False, header=names, lineterminator="\n").encode()
+    text: str = plain.to_csv(index=False, header=names, lineterminator="\n")
+    return text.encode()
 
 
 def parquet_of(tables: Iterable["pd.DataFrame"], about: Mapping[str, Any] | None = None) -> bytes:
@@ -61,7 +62,10 @@ def parquet_of(tables: Iterable["pd.DataFrame"], about: Mapping[str, Any] | None
 def records_of(table: "pd.DataFrame") -> list[dict[str, Any]]:
     """The lines of a table as plain Python values, None for what does not exist."""
     finite = _finite(table)
-    return finite.astype(object).where(finite.notna(), None).to_dict("records")
+    records: list[dict[str, Any]] = (
+        finite.astype(object).where(finite.notna(), None).to_dict("records")
+    )
+    return records
 
 
 def _finite(table: "pd.DataFrame") -> "pd.DataFrame":

@@ -48,6 +48,7 @@ def merged(table: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     both = dict(table)
     for key, value in over.items():
         inner = both.get(key)
-        tables = isinstance(value, Mapping) and isinstance(inner, Mapping)
-        both[key] = merged(inner, value) if tables else value
+        if isinstance(value, Mapping) and isinstance(inner, Mapping):
+            value = merged(inner, value)
+        both[key] = value
     return both

@@ -66,7 +66,7 @@ def places_shown(paths: Iterable[Path], beside: Path | None = None) -> dict[Path
         if not alike:
             return names
         names |= {path: printable("/".join(path.parts[-parts:])) for path in alike}
-    counts, seen = Counter(names.values()), Counter()
+    counts, seen = Counter(names.values()), Counter[str]()
     for path, name in names.items():
         seen[name] += 1
         names[path] = f"{name} ({seen[name]})" if counts[name] > 1 else name

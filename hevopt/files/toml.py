@@ -61,7 +61,8 @@ Model = TypeVar("Model", bound=FileModel)
 
 def shape_of(value: object) -> str:
     """Which of SHAPES a value has, so that pydantic reports faults against that shape alone."""
-    return {list: "a list", dict: "a table"}.get(type(value), "a number")
+    shapes: dict[type, str] = {list: "a list", dict: "a table"}
+    return shapes.get(type(value), "a number")
 
 
 def read_toml(path: Path, model: type[Model]) -> Model:
@@ -92,7 +93,8 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
         raise DataError(f"{path}: not valid TOML: a number has too many digits") from None
     except RecursionError:
         raise DataError(too_deep) from None
-    level, keys = [contents], 0
+    level: list[dict[str, Any] | list[Any]] = [contents]
+    keys = 0
     for _ in range(_DEPTH_MAX):
         keys += sum(len(table) for table in level if isinstance(table, dict))
         inner = (v.values() if isinstance(v, dict) else v for v in level)
@@ -150,7 +152,7 @@ def _all_faults(
     try:
         model.model_validate(table)
     except ValidationError as error:
-        found = [dict(fault) for fault in error.errors(include_url=False)]
+        found: list[dict[str, Any]] = [dict(fault) for fault in error.errors(include_url=False)]
     else:
         return []
     faulty = list(dict.fromkeys(str(fault["loc"][0]) for fault in found if fault["loc"]))
@@ -170,7 +172,7 @@ def _faults_of_checks(
 ) -> list[dict[str, Any]]:
     """Faults that the checks of a whole table find in its good keys; one that asks for a faulty key is left out."""
     fields = {n: f for n, f in model.model_fields.items() if n not in faulty}
-    parts = {name: (field.annotation, field) for name, field in fields.items()}
+    parts: dict[str, Any] = {name: (field.annotation, field) for name, field in fields.items()}
     good = create_model("Good", __base__=FileModel, **parts).model_validate(
         {name: table[name] for name in fields if name in table}
     )
@@ -242,7 +244,7 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 def _range(field: FieldInfo | None) -> str:
     """Both ends of what the numbers of a field may be."""
-    ends = {}
+    ends: dict[str, float] = {}
     for mark in _marks(field.annotation) + list(field.metadata) if field else []:
         ends |= {end: getattr(mark, end) for end in ("ge", "gt", "le", "lt") if hasattr(mark, end)}
     low = f"above {ends['gt']:g}" if "gt" in ends else f"{ends.get('ge', -float('inf')):g}"
@@ -252,7 +254,7 @@ def _range(field: FieldInfo | None) -> str:
 
 def _marks(annotation: Any) -> list[Any]:
     """Bounds of numbers anywhere in an annotation, as those of a list's entries."""
-    marks = []
+    marks: list[Any] = []
     for part in getattr(annotation, "__metadata__", ()):
         marks += getattr(part, "metadata", [part])
     for part in get_args(annotation):

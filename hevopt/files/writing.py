@@ -25,7 +25,7 @@ _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?")
 try:
     import fcntl
 except ImportError:  # not on every system
-    fcntl = None
+    fcntl = None  # type: ignore[assignment]
 
 _PREFIX = ".hevopt."
 # As `tempfile` completes it.

@@ -49,7 +49,9 @@ def _cells(row: Row, causal: frozenset[str]) -> list[str]:
     def number(value: float | None, form: str) -> str:
         return "-" if value is None else format(0.0 if abs(value) < 5e-7 else value, form)
 
-    change = None if row.soc_end is None else row.soc_end - row.soc_start
+    change = None
+    if row.soc_end is not None and row.soc_start is not None:
+        change = row.soc_end - row.soc_start
     return [
         row.architecture,
         row.strategy + (_CAUSAL_MARK if row.strategy in causal else ""),

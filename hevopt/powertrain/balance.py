@@ -8,6 +8,7 @@ With negative demand T_e stops at the drag torque and the brakes take what the s
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,5 +192,5 @@ def deliverable_nm(architecture: Architecture, demand: Demand, joint: Joint) -> 
     return np.where(joint.possible, total, 0.0)
 
 
-def _column(values: NDArray) -> NDArray:
+def _column(values: NDArray[Any]) -> NDArray[Any]:
     return values[:, None]

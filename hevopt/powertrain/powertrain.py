@@ -152,7 +152,8 @@ def _missing_nm(
     """(time,) wheel torque beyond what any joint delivers at the steps without a control; else 0."""
     limits = [deliverable_nm(architecture, demand, branch.joint) for branch in branches]
     short = demand.wheel_torque_nm - np.max(limits, axis=0)
-    return np.where(stuck, np.maximum(short, 0.0), 0.0)
+    missing: Array = np.where(stuck, np.maximum(short, 0.0), 0.0)
+    return missing
 
 
 def _stuck(branches: list[_Branch]) -> NDArray[np.bool_]:

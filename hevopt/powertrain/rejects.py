@@ -76,5 +76,5 @@ def function_rejects(
     return bits(Reject.FUNCTION, banned)
 
 
-def bits(reason: Reject, where: Array) -> Bits:
+def bits(reason: Reject, where: NDArray[np.bool_]) -> Bits:
     return np.where(where, np.uint16(reason), np.uint16(0))

@@ -59,8 +59,9 @@ def _advice(demand: Demand, stuck: NDArray[np.bool_], missing: Array, reject: Bi
     if limited.any():
         counts = {w: int(np.sum(reject[limited] & bit > 0)) for bit, w in REJECT_WORDS.items()}
         del counts[REJECT_WORDS[Reject.DUPLICATE]]
+        most = max(counts, key=lambda words: counts[words])
         advice.append(
-            f"where no torque is missing, most controls are rejected for: {max(counts, key=counts.get)}; "
+            f"where no torque is missing, most controls are rejected for: {most}; "
             "widen that limit in its component's file, or choose an easier cycle"
         )
     return advice

@@ -63,8 +63,8 @@ def car_base(like: str | None, given: Mapping[str, Any], rotating_kg: float | No
     return CarBase(contents, origins, rotating_kg)
 
 
-def check_mass(mass_kg: float | None) -> None:
-    """DataError unless the mass of the tested car is given and can be one."""
+def mass_of_test(mass_kg: float | None) -> float:
+    """The mass of the tested car, if it is given and can be one; else DataError."""
     low, high = _MASS_KG
     if mass_kg is None or not low <= mass_kg <= high:
         found = "is missing" if mass_kg is None else f"{mass_kg:g}"
@@ -72,6 +72,7 @@ def check_mass(mass_kg: float | None) -> None:
             f"--mass-kg {found}: coast-downs give force per mass; give the mass of the car as tested, driver "
             f"included, {low:g} to {high:g} kg"
         )
+    return mass_kg
 
 
 def car_contents(fit: RoadLoad, base: CarBase, mass_kg: float) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, Field, create_model, model_validator
 
@@ -52,7 +52,7 @@ class RangeFile(_Ends):
     log: bool = False
 
     @model_validator(mode="after")
-    def _rise(self):
+    def _rise(self) -> Self:
         low, high = getattr(self, "from"), self.to
         if not low < high:
             raise ValueError(f"from {low:g} must be below to {high:g}")

@@ -5,7 +5,7 @@ from functools import reduce
 from operator import or_
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, Literal, get_args, get_type_hints
+from typing import Annotated, Any, Literal, Self, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
@@ -88,7 +88,7 @@ class _StoredCase(_Fields):
     seconds: Annotated[float, Field(ge=0, le=_NUMBER_MAX)] | None
 
     @model_validator(mode="after")
-    def _consistent(self):
+    def _consistent(self) -> Self:
         stored = self.ending in SOLVED
         if (self.seconds is not None) != stored:
             raise ValueError(f"a case cannot be stored as {self.ending}")
