@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from hevopt import build_problem, load_architecture, load_cycle, simulate, solve
+from hevopt import build_problem, compare, load_architecture, load_cycle, simulate, solve
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import drain_at_j, one_price_dual
@@ -150,6 +150,19 @@ def lower() -> Figure:
     return figure
 
 
+def drive() -> Figure:
+    """The optimum over time."""
+    problem = _problem()
+    return simulate(problem, solve(problem).control).plot()[0].figure
+
+
+def rows() -> Figure:
+    """A comparison of two cars."""
+    axes = compare("hwfet", ["A", "C2"]).plot()
+    axes.set_xlim(left=0)
+    return axes.figure
+
+
 def flow() -> Figure:
     """The house: what flows from a cycle and a car to rows and pages."""
     figure = Figure(figsize=(9.0, 2.6))
@@ -183,7 +196,7 @@ def flow() -> Figure:
 
 
 FIGURES: dict[str, Callable[[], Figure]] = {
-    drawn.__name__: drawn for drawn in (flow, dual, prices, value, factor, lower)
+    drawn.__name__: drawn for drawn in (flow, dual, prices, value, factor, lower, drive, rows)
 }
 
 

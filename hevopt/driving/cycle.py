@@ -8,38 +8,35 @@ Lines that begin with # are comments.
 import csv
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.axes import Panel, drawn_over_time, speed_panel
 from hevopt.display.facts import Shown
+from hevopt.driving.values import GRADE_MAX, Tell, check_range, check_time_and_speed, whole_numbers
 from hevopt.errors import DataError, Fault
 from hevopt.files.lookup import find, read_text, shipped_names
 from hevopt.files.shown import printable, shown
 from hevopt.units import TO_SI
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 _SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
 COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
 _MEGABYTES_MAX = 50
 SAMPLES_MAX = 200_000
-_TIME_MAX_S = 1e9
-SPEED_MAX_MPS = 100.0
-GRADE_MAX = 0.5
-_STEP_MIN_S, _STEP_MAX_S = 1e-4, 3600.0
-# Twice the friction limit of a dry road: nothing on tyres does more.
-_ACCELERATION_MAX_MPS2 = 20.0
 # Figures per distance say nothing below this.
 DISTANCE_MIN_M = 1.0
 # For a log or another tool's cycle given where one of our own is expected.
 IMPORT = "a logged drive or another tool's cycle is converted by `hevopt cycles import FILE --out NAME.csv`"
 _OTHERS = (".xls", ".xlsx", ".mat", ".vdri", ".vbo", ".tsv")
-# Called with every fault found: line and text.
-_Values = NDArray[np.float64]
-_Tell = Callable[[int, str], None]
 # Plainer than Python's own: no underscores, no digits of other scripts.
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -68,6 +65,20 @@ class Cycle(Shown):
                 values = np.array(values)
                 values.flags.writeable = False
                 object.__setattr__(self, field, values)
+
+    def plot(self, axes: "Iterable[Axes] | None" = None) -> "list[Axes]":
+        """Speed over time, below it the gear and the grade where there are any.
+
+        axes: of matplotlib, one for each; by default new ones. Raises DataError where there are not as many.
+        """
+        panels = [speed_panel(self.speed_mps)]
+        if self.gear is not None:
+            panels.append(Panel("gear", {"gear": self.gear[:-1]}))
+        if self.grade.any():
+            panels.append(Panel("grade, %", {"grade": 100 * self.grade[:-1]}))
+        return drawn_over_time(
+            self.time_s, panels, f"{self.name}, {self.distance_m / 1e3:.2f} km", axes
+        )
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -136,7 +147,7 @@ def faults_in(path: Path) -> list[Fault | str]:
     return [Fault(f"{path}, line {line}", text) for line, text in sorted(faults)]
 
 
-def _cycle(path: Path, text: str, tell: _Tell) -> Cycle:
+def _cycle(path: Path, text: str, tell: Tell) -> Cycle:
     header, rows = _rows(path, text, tell)
     columns = {name: np.array([row[i] for _, row in rows]) for i, name in enumerate(header)}
     lines = [line for line, _ in rows]
@@ -144,13 +155,13 @@ def _cycle(path: Path, text: str, tell: _Tell) -> Cycle:
     factor = TO_SI.get(speed_column.removeprefix("speed"), ("", 1.0))[1]
     speed_mps = columns[speed_column] * factor
     grade = columns.get("grade", np.zeros(len(rows)))
-    _check_time_and_speed(lines, columns["time_s"], speed_mps, speed_column, factor, tell)
-    _check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell)
+    check_time_and_speed(lines, columns["time_s"], speed_mps, speed_column, factor, tell)
+    check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell)
     gear = clutch_open = None
     if "gear" in columns:
-        gear = _whole_numbers(lines, "gear", columns["gear"], 20, tell)
+        gear = whole_numbers(lines, "gear", columns["gear"], 20, tell)
         clutch = columns.get("clutch_open", np.zeros(len(rows)))
-        clutch_open = _whole_numbers(lines, "clutch_open", clutch, 1, tell).astype(bool)
+        clutch_open = whole_numbers(lines, "clutch_open", clutch, 1, tell).astype(bool)
     cycle = Cycle(
         printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open, path
     )
@@ -162,7 +173,7 @@ def _cycle(path: Path, text: str, tell: _Tell) -> Cycle:
     return cycle
 
 
-def _rows(path: Path, text: str, tell: _Tell) -> tuple[list[str], list[tuple[int, list[float]]]]:
+def _rows(path: Path, text: str, tell: Tell) -> tuple[list[str], list[tuple[int, list[float]]]]:
     """Header names and the numbers of every good data line, with its line number."""
     header: list[str] | None = None
     rows: list[tuple[int, list[float]]] = []
@@ -221,7 +232,7 @@ def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
     return cells
 
 
-def _number(line: int, column: str, cell: str, tell: _Tell) -> float | None:
+def _number(line: int, column: str, cell: str, tell: Tell) -> float | None:
     if not _NUMBER.fullmatch(cell):
         tell(
             line,
@@ -233,66 +244,3 @@ def _number(line: int, column: str, cell: str, tell: _Tell) -> float | None:
         tell(line, f"{column} is {shown(cell)}; a finite number is needed")
         return None
     return value
-
-
-def _check_time_and_speed(
-    lines: list[int],
-    time_s: NDArray[np.float64],
-    speed_mps: NDArray[np.float64],
-    column: str,
-    factor: float,
-    tell: _Tell,
-) -> None:
-    _check_range(lines, "time_s", time_s, -_TIME_MAX_S, _TIME_MAX_S, tell)
-    steps_s = np.diff(time_s)
-    for k in np.flatnonzero(steps_s <= 0) + 1:
-        tell(
-            lines[k],
-            f"time {time_s[k]:g} s after {time_s[k - 1]:g} s; time must increase from line to line; "
-            "sort the lines or remove the duplicate",
-        )
-    for k in (
-        np.flatnonzero((steps_s > 0) & ((steps_s < _STEP_MIN_S) | (steps_s > _STEP_MAX_S))) + 1
-    ):
-        tell(
-            lines[k],
-            f"{steps_s[k - 1]:g} s after the line before; allowed: {_STEP_MIN_S:g} to {_STEP_MAX_S:g} s; "
-            "time is in seconds",
-        )
-    outside = (speed_mps < 0) | (speed_mps > SPEED_MAX_MPS)
-    for k in np.flatnonzero(outside):
-        tell(
-            lines[k],
-            f"{column} is {speed_mps[k] / factor:g}; allowed: 0 to {SPEED_MAX_MPS / factor:g}; check the "
-            "unit in the column's name",
-        )
-    judged = (steps_s > 0) & ~outside[1:] & ~outside[:-1]
-    acceleration = np.diff(speed_mps) / np.where(judged, steps_s, 1.0)
-    for k in np.flatnonzero(judged & (np.abs(acceleration) > _ACCELERATION_MAX_MPS2)) + 1:
-        tell(
-            lines[k],
-            f"acceleration {acceleration[k - 1]:.3g} m/s²; allowed: ±{_ACCELERATION_MAX_MPS2:g} m/s², more "
-            "than tyres hold; check the units of time and speed, or repair the spike",
-        )
-
-
-def _check_range(
-    lines: list[int],
-    column: str,
-    values: _Values,
-    low: float,
-    high: float,
-    tell: _Tell,
-) -> None:
-    for k in np.flatnonzero((values < low) | (values > high)):
-        tell(lines[k], f"{column} is {values[k]:g}; allowed: {low:g} to {high:g}")
-
-
-def _whole_numbers(
-    lines: list[int], column: str, values: _Values, high: int, tell: _Tell
-) -> NDArray[np.int64]:
-    _check_range(lines, column, values, 0, high, tell)
-    for k in np.flatnonzero(values != np.round(values)):
-        tell(lines[k], f"{column} is {values[k]:g}; a whole number is needed")
-    whole: NDArray[np.int64] = np.clip(np.round(values), 0, high).astype(np.int64)
-    return whole

@@ -13,11 +13,6 @@ if TYPE_CHECKING:
 _DPI = 110
 
 
-def _plain(text: str) -> str:
-    """Text without what matplotlib takes for a formula."""
-    return text.replace("$", r"\$")
-
-
 def _vectors(figure: Figure, kind: str) -> bytes:
     """An SVG or PDF, without its date and with names of parts that do not depend on chance."""
     out = BytesIO()

@@ -4,13 +4,14 @@ The powertrain is evaluated once for every step and every control; after that no
 Axis order is (time, control). Power > 0 flows towards the wheels; battery power > 0 discharges.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.axes import Panel, drawn_over_time, speed_panel
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery, energy_j, within_limits
@@ -18,6 +19,7 @@ from hevopt.problem.table import Array, ControlTable, Reject
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -184,3 +186,24 @@ class Trajectory(Shown):
             columns["missing_torque_nm"] = table.missing_torque_nm
         residuals = {f"residual_{n.replace(' ', '_')}_w": r for n, r in self.residuals.items()}
         return pd.DataFrame(columns | residuals)
+
+    def plot(self, axes: "Iterable[Axes] | None" = None) -> "list[Axes]":
+        """Speed, powers, charge with its window, and fuel burnt so far, above each other over time.
+
+        Speed is left out where the problem's table has no signals, the engine's power where it has no flows.
+        axes: of matplotlib, one for each; by default new ones. Raises DataError where there are not as many.
+        """
+        table, pack = self.problem.table, self.problem.battery
+        power_w = {"battery": self.battery_power_w}
+        if "engine_torque_nm" in self.flows:
+            torque, speed = self.flows["engine_torque_nm"], self.flows["engine_speed_radps"]
+            power_w = {"wheels": self.flows["wheel_power_w"], "engine": torque * speed, **power_w}
+        panels = [
+            Panel("power, kW", {name: power / 1e3 for name, power in power_w.items()}),
+            Panel("SOC", {"SOC": self.soc}, (pack.soc_min, pack.soc_max)),
+            Panel("fuel so far, g", {"fuel": np.append(0.0, np.cumsum(self.fuel_kg) * 1e3)}),
+        ]
+        if table.signals is not None:
+            panels.insert(0, speed_panel(table.signals.speed_mps))
+        edges_s = np.append(table.time_s, table.time_s[-1] + table.step_s[-1])
+        return drawn_over_time(edges_s, panels, axes=axes)

@@ -26,6 +26,7 @@ from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.strategies import Strategy, chosen, strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
+from hevopt.studies.drawing import draw_rows
 from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row, against_reference, failed_row
 from hevopt.studies.settings import Keywords, Settings, settings_from
@@ -33,6 +34,7 @@ from hevopt.studies.solved import check_horizon, run_case, strategies_for
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 _FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 
@@ -68,6 +70,13 @@ class Comparison(Shown):
         facts = [row._facts() for row in self.rows]
         heads = list(facts[0]) if facts else []
         return html_table(f"cycle {self.cycle}", heads, [list(fact.values()) for fact in facts])
+
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """What every row needs beside the bound that none can undercut; with a weight on NOx, of the sum of both.
+
+        axes: of matplotlib, by default new ones
+        """
+        return draw_rows(self.cycle, self.rows, self.nox_weight, axes)
 
     def to_frame(self) -> "pd.DataFrame":
         """The rows as a table of pandas, one line each: the cycle, then the fields of `Row`, units in the names."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
-from hevopt.driving.cycle import GRADE_MAX, SPEED_MAX_MPS
+from hevopt.driving.values import GRADE_MAX, SPEED_MAX_MPS
 from hevopt.errors import DataError
 from hevopt.measured.cycles.columns import Drive
 from hevopt.measured.cycles.fault_list import Faults, empty_cell, refused

@@ -7,10 +7,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hevopt.car_files.engine import EngineFile
+from hevopt.display.axes import plain
 from hevopt.measured.maps.envelope import Envelope, accepted, envelope_of
 from hevopt.measured.maps.gaps import WIDE, lowest_fired_nm, widest_gap
 from hevopt.measured.maps.request import Imported
-from hevopt.measured.plot import _plain, _png
+from hevopt.measured.plot import _png
 from hevopt.units import RPM_PER_RADPS
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def map_figure(imported: Imported) -> bytes:
     axes.plot(envelope.speed_radps * RPM_PER_RADPS, envelope.low_nm, "k--", label=low)
     _doubts(axes, imported, envelope)
     axes.set(
-        xlabel="speed, rpm", ylabel="torque, Nm", title=_plain(f"{file.name}: what the map covers")
+        xlabel="speed, rpm", ylabel="torque, Nm", title=plain(f"{file.name}: what the map covers")
     )
     axes.legend(loc="upper right")
     return _png(figure)
