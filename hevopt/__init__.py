@@ -19,6 +19,7 @@ _HOME = {
     "Trajectory": "hevopt.problem.problem",
     "Battery": "hevopt.problem.battery",
     "sensitivities": "hevopt.studies.sensitivity",
+    "pareto": "hevopt.studies.fronts",
     "STRATEGIES": "hevopt.strategies",
     "Strategy": "hevopt.strategies",
     "register": "hevopt.strategies",

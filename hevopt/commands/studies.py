@@ -1,6 +1,7 @@
 """`hevopt pareto`, `sensitivity` and `reproduction`: many problems solved for one answer."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from hevopt.car.architecture import Architecture
     from hevopt.driving.cycle import Cycle
     from hevopt.pages.comparison.results import Results
-    from hevopt.problem.problem import Problem
     from hevopt.studies.cars import Cars
     from hevopt.studies.sensitivity import Effect
     from hevopt.studies.settings import Settings
@@ -55,6 +55,7 @@ def pareto(
     from hevopt.commands.studies_view import front_notes, front_table, write_front
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies.cars import cars_of
+    from hevopt.studies.fronts import front_of
     from hevopt.studies.settings import given_of, study_of
 
     if "nox_weight" in given:
@@ -67,22 +68,23 @@ def pareto(
     if out is not None:
         _check_csv(out, [*cars.cars[0].files, *filter(None, [trace.source])])
     with Progress() as progress:
-        figures, shortfall_steps = _front(
+        found = front_of(
             cars.cars[0],
             trace,
             settings,
-            progress,
-            strategy=strategy,
+            strategy,
             weights=chosen,
             points=points,
+            progress=progress,
         )
     if out is not None:
-        write_front(out, figures)
+        write_front(out, found)
     if json:
-        write(_json(figures | {"shortfall_steps": shortfall_steps} | _about(cars, trace)))
+        short = {"shortfall_steps": found.shortfall_steps}
+        write(_json(found.as_dict() | short | _about(cars, trace)))
         return
-    show(front_table(figures))
-    write(front_notes(figures, cars.cars[0], shortfall_steps, refined=settings.refine))
+    show(front_table(found))
+    write(front_notes(found, cars.cars[0], refined=settings.refine))
     if out is not None:
         write(f"front written to {out}")
 
@@ -144,15 +146,17 @@ def with_studies(
     A car whose front or sensitivities cannot be had is a failure, and costs no other result.
     """
     from hevopt.pages.comparison.results import ParetoFront, Sensitivity
+    from hevopt.studies.fronts import front_of
 
     wanted = [car for car in cars.cars if car.name in results.cars]
+    settings = replace(settings, horizon_s=None)  # of dp and the rules, which look at no preview
     added: dict[str, list[Any]] = {"pareto": [], "sensitivity": []}
     failures: dict[str, HevoptError] = {}
     with Progress() as progress:
         for car in wanted if fronts else ():
             try:
-                figures, _ = _front(car, trace, settings, progress)
-                added["pareto"].append(ParetoFront.model_validate(figures))
+                front = front_of(car, trace, settings, progress=progress)
+                added["pareto"].append(ParetoFront.model_validate(front.as_dict()))
             except HevoptError as error:
                 failures[f"{car.name} front"] = error
         for car in wanted if effects else ():
@@ -165,49 +169,6 @@ def with_studies(
     asked = {"pareto": fronts, "sensitivity": effects}
     update = {name: lines for name, lines in added.items() if asked[name]}
     return results.model_copy(update=update | {"failures": said}), failures
-
-
-def _front(
-    car: "Architecture",
-    trace: "Cycle",
-    settings: "Settings",
-    progress: Progress,
-    *,
-    strategy: str = "dp",
-    weights: Sequence[float] | None = None,
-    points: int | None = None,
-) -> tuple[dict[str, Any], int]:
-    """The figures of a car's front, and the number of steps driven with less than the cycle asks."""
-    from hevopt.output.front_figures import figures_of
-    from hevopt.strategies import strategy_named
-    from hevopt.studies.case import require_nox
-    from hevopt.studies.pareto import GAP_ENOUGH, POINTS_MAX, front
-    from hevopt.studies.rows import shortfall_steps
-
-    chosen = strategy_named(strategy)
-    if chosen.learns:
-        raise DataError(f"--strategy {strategy} learns from other cycles; choose another, as dp")
-    require_nox(car, "a front of fuel and NOx")
-    problem = _problem(car, trace, settings)
-    found = front(
-        problem,
-        weights,
-        points_max=POINTS_MAX if points is None else points,
-        gap_enough=GAP_ENOUGH if points is None else 0.0,
-        solve=chosen.solve,
-        progress=lambda text, done, total: progress(f"{car.name}: {text}", done, total),
-    )
-    return figures_of(found, car, trace, strategy), shortfall_steps(problem)
-
-
-def _problem(car: "Architecture", trace: "Cycle", settings: "Settings") -> "Problem":
-    """What a front is drawn on: the very table of the comparison's rows, so that none can lie beyond it."""
-    from hevopt.powertrain.powertrain import build_problem
-    from hevopt.studies.case import prepare
-
-    if settings.refine:
-        return prepare(car, trace, settings).problem
-    return build_problem(car, trace, allow_shortfall=settings.allow_shortfall)
 
 
 def _effects(

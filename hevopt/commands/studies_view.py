@@ -1,8 +1,7 @@
 """What `hevopt pareto` and `sensitivity` show and write."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rich import box
 from rich.table import Table
@@ -12,6 +11,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle
 from hevopt.files.frames import csv_of
 from hevopt.files.writing import write_whole
+from hevopt.studies.fronts import CarFront
 from hevopt.studies.sensitivity import Effect, unsolved
 
 _EFFECTS_NOTES = """fuel: charge-corrected, change against the car as given. elasticity: per cent of fuel (NOx) per
@@ -24,45 +24,44 @@ _NOTHING = (
 SHORTFALL_NOTE = "Where the car cannot follow, each value drives on with less than the cycle asks."
 
 
-def write_front(out: Path, figures: Mapping[str, Any]) -> None:
+def write_front(out: Path, front: CarFront) -> None:
     """Points and outer front in one table; what has no meaning for a line is empty."""
     import pandas as pd
 
     names = ["kind", "nox_weight", "strategy", "fuel_l_per_100km", "nox_mg_per_km", "bound_l_per_100km",
              "gap_percent", "certificate"]  # fmt: skip
+    figures = front.as_dict()
     lines = [{"kind": "plan", **point} for point in figures["points"]]
     lines += [{"kind": "outer front", **corner} for corner in figures["outer"]]
     write_whole(out, csv_of(pd.DataFrame(lines, columns=names)))
 
 
-def front_table(figures: Mapping[str, Any]) -> Table:
+def front_table(front: CarFront) -> Table:
     """The points of a front."""
     heads = ["weight\nkg/kg", "fuel\nl/100km", "NOx\nmg/km", "bound\nl/100km", "gap\n%", "proof"]
-    strategy = figures["points"][0]["strategy"]
-    title = f"cycle {figures['cycle']}, {figures['architecture']} {strategy}: fuel against NOx"
+    strategy = front.points[0].strategy
+    title = f"cycle {front.cycle}, {front.architecture} {strategy}: fuel against NOx"
     table = _empty(title, heads, "rrrrrl")
-    for point in figures["points"]:
-        gap = point["gap_percent"]
+    for point in front.points:
+        gap = point.gap_percent
         cells = [
-            " to ".join(f"{weight:.4g}" for weight in _ends(point["nox_weights"])),
-            f"{point['fuel_l_per_100km']:.3f}",
-            f"{point['nox_mg_per_km']:.1f}",
-            f"{point['bound_l_per_100km']:.3f}",
+            " to ".join(f"{weight:.4g}" for weight in _ends(point.nox_weights)),
+            f"{point.fuel_l_per_100km:.3f}",
+            f"{point.nox_mg_per_km:.1f}",
+            f"{point.bound_l_per_100km:.3f}",
             "-" if gap is None else f"{gap:.3f}",
-            point["certificate"],
+            point.certificate,
         ]
         table.add_row(*map(Text, cells))
     return table
 
 
-def front_notes(
-    figures: Mapping[str, Any], car: Architecture, shortfall_steps: int, *, refined: bool
-) -> str:
+def front_notes(front: CarFront, car: Architecture, *, refined: bool) -> str:
     """What the columns mean, and what the front as a whole says."""
-    weights = [weight for point in figures["points"] for weight in point["nox_weights"]]
+    weights = [weight for point in front.points for weight in point.nox_weights]
     short = ""
-    if shortfall_steps:
-        short = f"\nsteps driven with less than the cycle asks: {shortfall_steps}."
+    if front.shortfall_steps:
+        short = f"\nsteps driven with less than the cycle asks: {front.shortfall_steps}."
     if refined:
         short += "\nrefined: one table for all weights, torque levels added around the plan of least fuel."
     return f"""weight: kg of fuel that a kg of NOx counts, first to last of those for which no plan found is better.
@@ -70,7 +69,7 @@ bound: no plan over the tabulated controls that ends with a state of charge of {
 fuel + weight x NOx, as fuel volume. Each bound is a half plane of the diagram; no plan lies beyond any of them.
 gap: the point's own sum above its bound; charge left beyond what is asked is not credited.
 {len(weights)} weights from {weights[0]:g} to {weights[-1]:.4g}: for any of them or between, the best point is
-within {figures["gap_percent"]:.3f} % of the least that the bounds leave.{short}"""
+within {front.gap_percent:.3f} % of the least that the bounds leave.{short}"""
 
 
 def effects_table(effects: Sequence[Effect], trace: Cycle) -> Table:

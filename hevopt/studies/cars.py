@@ -29,7 +29,9 @@ def cars_of(wanted: Iterable[Architecture | str | Path] | None, settings: Settin
     to change one that is read already.
     """
     names = shipped_names("architectures", ".toml") if wanted is None else wanted
-    cars, changes, without = [], {}, {}
+    cars: list[Architecture] = []
+    changes: dict[str, dict[str, Any]] = {}
+    without: dict[str, list[str]] = {}
     for name in names:
         car, made, left = _car(name, settings)
         cars.append(car)

@@ -83,6 +83,20 @@ class Comparison(Shown):
         return rows_frame(self.cycle, self.rows)
 
 
+# Called with what comes next, and how many of how many are done.
+Progress = Callable[[str, int, int], None]
+# Called with every solved case, its row (no reference yet), plan and trajectory.
+Observe = Callable[[Case, Row, Plan, Trajectory], None]
+
+
+def unseen(text: str, done: int, total: int) -> None:
+    """Nobody looks on."""
+
+
+def unobserved(case: Case, row: Row, plan: Plan, trajectory: Trajectory) -> None:
+    """Nobody keeps anything."""
+
+
 class Watch(NamedTuple):
     """Who is told while a comparison runs.
 
@@ -90,8 +104,8 @@ class Watch(NamedTuple):
     observe: every solved case, its row (no reference yet), plan and trajectory
     """
 
-    progress: Callable[[str, int, int], None] = lambda text, done, total: None
-    observe: Callable[[Case, Row, Plan, Trajectory], None] = lambda *solved: None
+    progress: Progress = unseen
+    observe: Observe = unobserved
 
 
 _NOBODY = Watch()
@@ -115,8 +129,8 @@ def compare(
     architectures: Architecture | str | Path | Iterable[Architecture | str | Path] | None = None,
     strategies: Strategies | None = None,
     *,
-    progress: Callable[[str, int, int], None] | None = None,
-    observe: Callable[[Case, Row, Plan, Trajectory], None] | None = None,
+    progress: Progress | None = None,
+    observe: Observe | None = None,
     **settings: Unpack[Keywords],
 ) -> Comparison:
     """Every strategy (by default the usual ones that fit) on every architecture (by default the shipped ones).
@@ -136,14 +150,8 @@ def compare(
         architectures = [architectures]
     cars = cars_of(architectures, told)
     drive = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
-    watch = {"progress": progress, "observe": observe}
-    found = compare_cars(
-        cars.cars,
-        drive,
-        told,
-        others=others,
-        watch=Watch(**{n: who for n, who in watch.items() if who is not None}),
-    )
+    watch = Watch(progress or unseen, observe or unobserved)
+    found = compare_cars(cars.cars, drive, told, others=others, watch=watch)
     return replace(found, left_out=cars.left_out)
 
 

@@ -33,7 +33,7 @@ GAP_ENOUGH = 1e-3
 # The largest weight makes NOx count this many times the fuel of the least-fuel plan.
 _NOX_OVER_FUEL = 10.0
 # Weights closer than this share, and points closer than this share of fuel and NOx, are one.
-_SAME = 1e-6
+SAME = 1e-6
 WEIGHT_MAX = 1e6
 
 
@@ -103,7 +103,7 @@ def front(
     add(0.0, points_max)
     least_fuel = solved[0][0]
     if points_max > 1 and least_fuel.nox_kg > 0:
-        highest = _NOX_OVER_FUEL * max(least_fuel.fuel_kg, _SAME) / least_fuel.nox_kg
+        highest = _NOX_OVER_FUEL * max(least_fuel.fuel_kg, SAME) / least_fuel.nox_kg
         add(min(highest, WEIGHT_MAX), points_max)
     found = _front(solved)
     while len(solved) < points_max and found.gap > gap_enough:
@@ -166,7 +166,7 @@ def _supported(plans: Sequence[Point], weights: Sequence[float]) -> tuple[Point,
 
 def _alike(a: Point, b: Point) -> bool:
     fuel, nox = abs(a.fuel_kg - b.fuel_kg), abs(a.nox_kg - b.nox_kg)
-    return fuel <= _SAME * abs(a.fuel_kg) and nox <= _SAME * abs(a.nox_kg)
+    return fuel <= SAME * abs(a.fuel_kg) and nox <= SAME * abs(a.nox_kg)
 
 
 def _corners(half_planes: Sequence[HalfPlane]) -> tuple[tuple[float, float], ...]:
@@ -222,7 +222,7 @@ def _next_weight(found: Front, gap_enough: float) -> float | None:
     open_ties = [
         (_gap(found.points, found.corners, found.half_planes, tie), tie)
         for tie in _ties(found.points)
-        if all(abs(tie - weight) > _SAME * max(tie, weight) for weight in weights)
+        if all(abs(tie - weight) > SAME * max(tie, weight) for weight in weights)
     ]
     gap, tie = max(open_ties, default=(0.0, 0.0))
     return tie if gap > gap_enough else None

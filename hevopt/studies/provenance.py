@@ -65,7 +65,11 @@ def _reached() -> set[Path]:
             continue
         reached.add(path)
         for node in ast.walk(ast.parse(path.read_bytes())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hevopt"):
+            if (
+                isinstance(node, ast.ImportFrom)
+                and node.module
+                and node.module.startswith("hevopt")
+            ):
                 module = node.module.removeprefix("hevopt").removeprefix(".")
                 names = (f"{module}.{alias.name}".strip(".") for alias in node.names)
                 waiting += [file for name in (module, *names) for file in _files_of(name)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from hevopt.bounds.certificate import Claim
 from hevopt.car.architecture import Architecture
@@ -64,7 +65,7 @@ class Row(Shown):
             "status": str(self.status),
         }
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """All fields by name, in order, as JSON has them: status and certificate as text."""
         certificate = None if self.certificate is None else str(self.certificate)
         texts = {"status": str(self.status), "certificate": certificate}

@@ -6,7 +6,7 @@ the lowest to the highest value: d ln(fuel) / d ln(figure). A value at which the
 but a reason; all others keep theirs.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from math import log
 from pathlib import Path
@@ -20,10 +20,10 @@ from hevopt.errors import HevoptError
 from hevopt.strategies import Strategy, chosen, fitting, strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
-from hevopt.studies.comparison import Strategies
+from hevopt.studies.comparison import Progress, Strategies, unseen
 from hevopt.studies.rows import Row
 from hevopt.studies.settings import Keywords, Settings, settings_from
-from hevopt.studies.solved import run_case
+from hevopt.studies.solved import check_horizon, run_case
 from hevopt.studies.trials import Trial, trials_of
 
 # Fuel or NOx of less is none: a change against it has no meaning.
@@ -70,7 +70,7 @@ def sensitivities(
     cycle: Cycle | str | Path = "nedc",
     strategies: Strategies | None = None,
     *,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
     **settings: Unpack[Keywords],
 ) -> list[Effect]:
     """The effect of every parameter that the architecture has, strategy by strategy.
@@ -86,12 +86,8 @@ def sensitivities(
     cars = cars_of([architecture], told)
     trace = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
     (car,) = cars.cars
-    made, watch = cars.changes[car.name], progress or _unseen
+    made, watch = cars.changes[car.name], progress or unseen
     return effects_on(car, made, trace, told, told.strategies, watch, others)
-
-
-def _unseen(text: str, done: int, total: int) -> None:
-    pass
 
 
 def effects_on(
@@ -100,7 +96,7 @@ def effects_on(
     trace: Cycle,
     settings: Settings,
     strategies: Sequence[str] | None = None,
-    progress: Callable[[str, int, int], None] = _unseen,
+    progress: Progress = unseen,
     others: Mapping[str, Strategy] = _NO_OTHERS,
 ) -> list[Effect]:
     """The effects on a car, see `sensitivities`. made: key path -> value of what was changed when it was read."""
@@ -108,6 +104,7 @@ def effects_on(
     names = list(strategies or _usual(car.functions))
     for name in names:
         strategy_named(name, others)
+    check_horizon(settings.horizon_s, names, others)
     trials = trials_of(car.contents)
     total = 1 + sum(1 for trial in trials for changes in trial.changes if changes)
     done = 0
@@ -120,7 +117,7 @@ def effects_on(
             case = prepare(load_architecture(car.source, {**base, **changes}), trace, settings)
         except HevoptError as error:
             return dict.fromkeys(names, error)
-        return {name: _row(case, name, others) for name in names}
+        return {name: _row(case, name, settings, others) for name in names}
 
     given = {name: _required(car.name, row) for name, row in solved({}, "as given").items()}
     effects: list[Effect] = []
@@ -133,9 +130,11 @@ def effects_on(
     return sorted(effects, key=lambda effect: names.index(effect.strategy))
 
 
-def _row(case: Case, strategy: str, others: Mapping[str, Strategy]) -> Row | HevoptError:
+def _row(
+    case: Case, strategy: str, settings: Settings, others: Mapping[str, Strategy]
+) -> Row | HevoptError:
     try:
-        return run_case(case, strategy, others=others)[0]
+        return run_case(case, strategy, settings.horizon_s, others)[0]
     except HevoptError as error:
         return error
 

@@ -156,7 +156,7 @@ class Study(NamedTuple):
 
 def study_of(given: Mapping[str, Any]) -> Study:
     """The comparison of what is given, as `given_of` has it, and the default of what is not."""
-    file = CompareFile.model_validate(dict(given))
+    file: Any = CompareFile.model_validate(dict(given))
     own = {f.name: getattr(file, f.name) for f in fields(Settings) if f.name != "changes"}
     return Study(file.cycle, file.architectures, Settings(**own, changes=file.set))
 

@@ -17,10 +17,11 @@ from hevopt import (
     Problem,
     load_architecture,
     load_cycle,
+    pareto,
     simulate,
     solve,
 )
-from hevopt.output.front_figures import figures_of
+from hevopt.studies.fronts import in_units
 from hevopt.studies.pareto import GAP_ENOUGH, Front, HalfPlane, Point, front
 
 # Strategies and weights whose plans are held against the outer front.
@@ -73,7 +74,7 @@ def test_a_plan_that_ends_short_and_below_the_bound_has_no_gap():
     short, level = Point((0.0,), 0.9, 0.0), Point((0.0,), 1.0 - 1e-12, 0.0)
     planes = (HalfPlane(0.0, 1.0, "one multiplier"),)
     gaps = [
-        figures_of(Front((point,), planes, (), 0.0), car, cycle, "ecms")["points"][0]["gap_percent"]
+        in_units(Front((point,), planes, (), 0.0), car, cycle, "ecms", 0).points[0].gap_percent
         for point in (short, level)
     ]
     assert gaps == [None, 0.0]
@@ -157,7 +158,7 @@ def test_the_figures_are_those_of_the_front_in_the_units_of_a_report(problem_of)
 
     car, cycle = load_architecture("B"), load_cycle("nedc")
     found = front(problem_of("B", "nedc"), [0.0, 50.0])
-    figures = figures_of(found, car, cycle, "dp")
+    figures = in_units(found, car, cycle, "dp", 0).as_dict()
     first, km = figures["points"][0], cycle.distance_m / 1e3
     assert first["fuel_l_per_100km"] == pytest.approx(found.points[0].fuel_kg / 0.835 / km * 100)
     assert first["nox_mg_per_km"] == pytest.approx(found.points[0].nox_kg * 1e6 / km)
@@ -169,6 +170,46 @@ def test_the_figures_are_those_of_the_front_in_the_units_of_a_report(problem_of)
             [corner["fuel_l_per_100km"] for corner in figures["outer"]][::-1],
         )
         assert edge <= point["fuel_l_per_100km"] * (1 + 1e-12)
+
+
+def test_from_python_it_is_the_front_of_the_command(monkeypatch, capsys):
+    words = ("pareto", "B", "--weights", "0,20", "--auxiliaries", "400", "--json")
+    by_command = json.loads(call(monkeypatch, capsys, *words)[1])
+    found = pareto("B", weights=[0, 20], auxiliaries_w=400)
+    assert {name: by_command[name] for name in found.as_dict()} == found.as_dict()
+    table = found.to_frame()
+    assert list(table["nox_weight"]) == [point.nox_weights[0] for point in found.points]
+    assert table["fuel_l_per_100km"].dtype == "float64" and "points" in repr(found)
+
+
+def test_a_front_of_ones_own_strategy_has_the_same_outer_front():
+    weights = [0.0, 20.0]
+    own = pareto(
+        "B", weights=weights, strategy={"mine": lambda problem: solve(problem, "start_stop")}
+    )
+    dp = pareto("B", weights=weights)
+    assert {point.strategy for point in own.points} == {"mine"}
+    assert own.gap_percent >= dp.gap_percent
+    bounds = {point.nox_weights[0]: point.bound_l_per_100km for point in dp.points}
+    assert own.points[0].bound_l_per_100km == bounds[0.0]
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"weights": [0], "points": 3}, "choose one"),
+        ({"nox_weight": 3}, "give them as weights="),
+        ({"strategy": ["dp", "ecms"]}, "the plans of one strategy"),
+        ({"strategy": "sdp"}, "learns from other cycles"),
+        ({"horizon_s": 5}, "no strategy asked for looks ahead"),
+        ({"weights": [-1]}, "allowed: 0 to"),
+        ({"wieghts": [1]}, "setting 'wieghts' not found"),
+    ],
+)
+def test_a_mistake_in_python_is_one_message(settings, said):
+    with pytest.raises(DataError) as error:
+        pareto("B", **settings)
+    assert said in str(error.value)
 
 
 def test_the_command_shows_and_writes_one_front(monkeypatch, capsys, tmp_path):

@@ -134,7 +134,7 @@ def test_what_a_car_lacks_costs_the_comparison_nothing(hevopt, monkeypatch):
         raise SolverError("no front")
 
     monkeypatch.setattr("hevopt.studies.sensitivity.effects_on", failing)
-    monkeypatch.setattr("hevopt.studies.pareto.front", no_front)
+    monkeypatch.setattr("hevopt.studies.fronts.front", no_front)
     words = ("--sensitivity", "--fronts", "--save", "saved.gz", "--out", "rows.csv")
     status, out, err = hevopt("compare", "--architectures", "A,B", "--strategies", "dp", *words)
     assert status == 3 and "B sensitivity: B fails" in err and "A front: no front" in err
