@@ -107,7 +107,9 @@ def _run_end(low: int, high: int, start: float, rise: float, whole: int) -> int:
     """First cell at or after `low` whose move start + rise (cell - low) has left `whole`, at most `high`."""
     if rise <= 0.0:
         return high
-    end = min(high, max(low + int(np.ceil((whole + 1 - start) / rise)), low + 1))
+    # A tiny rise needs more cells than a whole number holds.
+    cells = np.ceil((whole + 1 - start) / rise)
+    end = max(low + int(cells), low + 1) if cells < high - low else high
     while end > low + 1 and start + rise * (end - 1 - low) > whole + 1:
         end -= 1
     return end

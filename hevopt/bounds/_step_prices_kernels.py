@@ -16,6 +16,8 @@ from hevopt.problem.choices import Choices
 
 # A step's price is at most this multiple of the next one's; any prices are valid.
 _GROWTH_MAX = 10.0
+# Only ratios of prices count: where they outgrow this, all so far are taken smaller.
+_PRICE_MAX = 2.0**500
 
 
 class WindowCells(NamedTuple):
@@ -30,12 +32,14 @@ class WindowCells(NamedTuple):
 
 @compiled()
 def costate(energy: Array, power: Array, step_s: Array, battery: BatteryArrays) -> Array:
-    """Prices (time,) of x_1 ... x_T that make a rollout stationary, 1 at the end."""
+    """Prices (time,) of x_1 ... x_T that make a rollout stationary, 1 at the end or less beside very great ones."""
     steps = len(power)
     price = np.ones(steps)
     for k in range(steps - 1, 0, -1):
         _, slope = drain_and_slope(power[k], energy[k], battery)
         price[k - 1] = price[k] * min(max(1.0 - step_s[k] * slope, 0.0), _GROWTH_MAX)
+        if price[k - 1] > _PRICE_MAX:
+            price[k - 1 :] /= _PRICE_MAX
     return price
 
 

@@ -36,7 +36,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hevopt.bounds import _lower_dp_kernels as kernels
-from hevopt.bounds.prices import EPSILON, bounded_choices, drain_magnitude_w
+from hevopt.bounds.prices import EPSILON, bounded_choices, drain_magnitude_w, end_slack_j
 from hevopt.bounds.step_prices import line_above, steep, window_cells
 from hevopt.problem.arrays import Array
 from hevopt.problem.choices import Choices, without_dominated
@@ -73,11 +73,6 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
     bound = float(np.interp(problem.start_j, grid, value[problem.start_mode]))
     most = abs(unreachable) + slope * 4.0 * (grid[-1] - grid[0])
     return float(bound - 16.0 * EPSILON * choices.steps * most)
-
-
-def end_slack_j(problem: Problem) -> float:
-    """How much less than the asked end charge a bound of this kind still covers: what a window is granted."""
-    return problem.battery.granted_window_j[1] - problem.window_j[1]
 
 
 def _parts(choices: Choices) -> Iterator[Choices]:

@@ -62,6 +62,11 @@ class Line:
     price_kgpj: float
 
 
+def end_slack_j(problem: Problem) -> float:
+    """How much less than the asked end charge a plan may leave and still counts: what a window is granted."""
+    return problem.battery.granted_window_j[1] - problem.window_j[1]
+
+
 def bounded_choices(problem: Problem) -> Choices:
     """The choices that a bound must count: all but those that leave the window whatever the charge before.
 
@@ -190,7 +195,8 @@ class _Priced:
         free = frozen("switching", np.zeros_like(self.choices.switch_kg))
         _, path = self._shortest(self.choices._replace(switch_kg=free), self.worth)
         slope = self._slope(path)
-        if slope > 0:
+        # A plan that misses the end by no more than it may is one: g then rises without end, but slowly.
+        if slope > self.end_price * end_slack_j(self.problem):
             raise InfeasibleError(
                 "the end charge cannot be reached by any plan; ask for a lower soc_end or widen the window"
             )

@@ -61,9 +61,13 @@ def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
 
 
 def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[Line]:
-    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0."""
+    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0.
+
+    The shape is taken at a size of about 1, by a power of two, which no product of prices and energies overflows.
+    """
     if not (np.isfinite(price).all() and (price >= 0).all()):
         raise SolverError("the prices of stored energy are not all finite and >= 0")
+    price = np.ldexp(price, -np.frexp(price.max())[1])
     choices = without_dominated(bounded_choices(problem))
     inside = problem.battery.within_window()
     line = line_above(inside)
@@ -117,11 +121,13 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     count = -(-choices.steps // _LP_STEPS)
     ends = [n * choices.steps // count for n in range(count + 1)]
     price = np.zeros(choices.steps)
-    low, _ = problem.window_j
+    low, high = problem.window_j
+    # Beyond the window, where rounding may lead, a control at the battery's limit may have no current.
+    energy_j = np.clip(rollout.energy_j, low, high)
     for begin, end in reversed(list(pairwise(ends))):
         reach = min(end + _LP_OVERLAP, choices.steps)
         wanted = (problem.end_min_j, 0.0) if reach == choices.steps else (low, price[reach - 1])
-        along = rollout.energy_j[begin:reach], rollout.battery_power_w[begin:reach]
+        along = energy_j[begin:reach], rollout.battery_power_w[begin:reach]
         found = _lp_part(problem, choices.part(begin, reach), *along, *wanted)
         price[begin:end] = found[: end - begin]
     return price

@@ -185,12 +185,15 @@ def _shift(
         moved = start + slope * (j - low)
         cells = int(np.floor(moved))
         # The run of nodes over which the whole cells stay the same: slope is far below one.
+        # A tiny slope needs more nodes than a whole number holds.
         run = high
+        further = float(high)
         if slope > 0:
-            run = min(high, low + int(np.ceil((cells + 1 - start) / slope)))
+            further = np.ceil((cells + 1 - start) / slope)
         elif slope < 0:
-            run = min(high, low + int(np.floor((cells - start) / slope)) + 1)
-        run = max(run, j + 1)
+            further = np.floor((cells - start) / slope) + 1.0
+        if further < high - low:
+            run = max(low + int(further), j + 1)
         bottom = min(max(j, -cells), run)
         top = max(min(run, nodes - 1 - cells), bottom)
         if bottom > j:

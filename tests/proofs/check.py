@@ -7,8 +7,8 @@ from proofs.exact import WINDOW_ROUNDING, Limits, every_plan
 
 from hevopt import Certificate, InfeasibleError, SolverError, certify, simulate
 from hevopt.bounds import certificate as certificate_module
-from hevopt.bounds.lower_dp import end_slack_j, lower_bound_kg
-from hevopt.bounds.prices import one_price_dual
+from hevopt.bounds.lower_dp import lower_bound_kg
+from hevopt.bounds.prices import end_slack_j, one_price_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.problem.problem import Problem
 from hevopt.problem.table import Reject
