@@ -34,6 +34,7 @@ _HOME = {
     "Comparison": "hevopt.studies.comparison",
     "read_saved": "hevopt.pages.comparison.frames",
     "read_saved_steps": "hevopt.pages.comparison.frames",
+    "sweep": "hevopt.sweeps.sweep",
     "read_sweep": "hevopt.sweeps.store.frames",
     "HevoptError": "hevopt.errors",
     "DataError": "hevopt.errors",

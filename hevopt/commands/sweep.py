@@ -14,13 +14,10 @@ from hevopt.files.shown import printable
 from hevopt.files.writing import note_written
 
 if TYPE_CHECKING:
-    from hevopt.sweeps.run import Execution, Plan, Progress
+    from hevopt.sweeps.run import Execution, Plan
     from hevopt.sweeps.signals import Wish
 
 _FIRST_CASES = 5
-_NOTHING_TO_PRUNE = (
-    "--prune: each design has a NOx weight of its own, none condemns another: nothing is pruned"
-)
 
 
 def sweep(
@@ -94,19 +91,33 @@ def sweep(
             )
         export_store(store, export)
         return
-    _check_system()
-    from hevopt.sweeps.run import Execution, Stopped
+    from hevopt.sweeps.sweep import check_system
+
+    check_system()
+    from hevopt.sweeps.into_store import check_sweep, into_store
+    from hevopt.sweeps.run import Execution, Stopped, Watch
     from hevopt.sweeps.signals import wish_to_end
 
     execution = Execution(backend, jobs, scheduler, timeout, memory_mb)
     store = study.with_suffix(".sqlite") if store is None else store
-    _check(execution, study, store, export, resume)
+    check_sweep(execution, study, store, {"--export": export})
+    _check(store, export, resume)
     with SweepProgress() as progress, wish_to_end() as wish:
         try:
             if dry_run:
                 _rehearse(study, store, execution, prune, retry_failed, progress, wish)
                 return
-            done = _run(study, store, execution, prune, retry_failed, export, progress, wish)
+            done = into_store(
+                study,
+                store,
+                execution,
+                command_line(),
+                prune=prune,
+                retry_failed=retry_failed,
+                watch=Watch(progress, progress.say, wish, wish.held),
+                planning=progress.plan,
+                outs={"--export": export},
+            )
         except (KeyboardInterrupt, Stopped):
             done = None
         progress.finish()
@@ -134,28 +145,10 @@ def _check_given(context: typer.Context) -> None:
         raise DataError(f"{alone}; leave out {', '.join(extra)}")
 
 
-def _check_system() -> None:
-    """DataError where the system lacks what keeps stores and workers safe."""
-    try:
-        import fcntl  # noqa: F401
-        import resource  # noqa: F401
-    except ImportError:
-        raise DataError(
-            "sweeps run on Linux, not on this system; stores from there can be looked at, exported and reported "
-            "here"
-        ) from None
-
-
-def _check(
-    execution: "Execution", study: Path, store: Path, export: Path | None, resume: bool
-) -> None:
-    """DataError, before anything is planned, where something could not be had at the end."""
-    from hevopt.files.writing import check_outs
+def _check(store: Path, export: Path | None, resume: bool) -> None:
+    """DataError, before anything is planned, for a table that cannot be written, or a store that was to be new."""
     from hevopt.sweeps.store.export import check_export
-    from hevopt.sweeps.workers.pools import check_backend
 
-    check_backend(execution.backend, execution.scheduler)
-    check_outs({"--store": store, "--export": export}, [study])
     if export is not None:
         check_export(export)
     if store.exists() and store.stat().st_size and not resume:
@@ -163,48 +156,6 @@ def _check(
             f"{store} exists, and --no-resume asks for a new store; remove it yourself, or name another "
             "with --store"
         )
-
-
-def _run(
-    study: Path,
-    store: Path,
-    execution: "Execution",
-    prune: bool,
-    retry_failed: bool,
-    export: Path | None,
-    progress: SweepProgress,
-    wish: "Wish",
-) -> "Progress":
-    """How it went. Raises Stopped."""
-    from hevopt.files.writing import check_outs
-    from hevopt.sweeps.plan.study_file import read_study
-    from hevopt.sweeps.run import Watch, begin, plan_of, run_sweep
-    from hevopt.sweeps.store.lock import locked
-    from hevopt.sweeps.store.reading import open_to_read
-    from hevopt.sweeps.store.store import open_store
-
-    contents = read_study(study)
-    with locked(store):
-        if store.exists() and store.stat().st_size:
-            with open_to_read(store):
-                pass  # one message at once, not after minutes of planning, where it is no store
-        plan = plan_of(contents, prune=prune, progress=progress.plan)
-        check_outs({"--export": export}, plan.inputs)
-        with open_store(store) as opened:
-            begin(plan, opened, command_line())
-            if prune and not plan.prunable:
-                progress.say(_NOTHING_TO_PRUNE)
-            others = opened.others()
-            if others and not opened.endings():
-                progress.say(
-                    f"{store} holds {others} results, none that this study asks for as it is now (inputs, "
-                    "strategies, hevopt or a library changed): they stay, and everything is run"
-                )
-            with wish.held():
-                return run_sweep(
-                    plan, opened, execution, prune=prune, retry_failed=retry_failed,
-                    watch=Watch(progress, progress.say, wish),
-                )  # fmt: skip
 
 
 def _rehearse(
@@ -217,6 +168,7 @@ def _rehearse(
     wish: "Wish",
 ) -> None:
     from hevopt.sweeps.estimate import timed_sample
+    from hevopt.sweeps.into_store import NOTHING_TO_PRUNE
     from hevopt.sweeps.plan.designs import merged_values
     from hevopt.sweeps.plan.study_file import read_study
     from hevopt.sweeps.run import Watch, plan_of, settled
@@ -236,7 +188,7 @@ def _rehearse(
             f"{printable(key)}: {asked} values asked for, {distinct} once rounded to whole numbers"
         )
     if prune and not plan.prunable:
-        write(_NOTHING_TO_PRUNE)
+        write(NOTHING_TO_PRUNE)
     with wish.held():
         sample = timed_sample(plan, keys - done, execution, Watch(notice=progress.say, stop=wish))
     if sample is None:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from time import monotonic
@@ -80,11 +80,15 @@ class Progress:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Watch:
-    """Who looks on. progress: called some times a second; notice: what went wrong; stop: whether to end now."""
+    """Who looks on. progress: called some times a second; notice: what went wrong; stop: whether to end now.
+
+    held: entered for the part of a sweep that asks `stop`
+    """
 
     progress: Callable[[Progress], None] = lambda progress: None
     notice: Callable[[str], None] = lambda text: None
     stop: Callable[[], bool] = lambda: False
+    held: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
 class Stopped(Exception):
