@@ -317,7 +317,7 @@ def test_a_sweep_with_missing_cases_is_never_a_success(tmp_path, monkeypatch, ca
             connection.execute("DELETE FROM cases WHERE key = (SELECT min(key) FROM cases)")
         return Progress(8)
 
-    monkeypatch.setattr("hevopt.sweeps.run.run_sweep", begin_and_forget)
+    monkeypatch.setattr("hevopt.sweeps.into_store.run_sweep", begin_and_forget)
     status, out, _ = called(monkeypatch, capsys, study)
     assert status == 4 and "1 cases have no result; the same command runs them" in out
 
@@ -327,7 +327,7 @@ def test_names_that_are_no_utf8_are_swept_stored_and_reported(tmp_path, monkeypa
     folder.mkdir()
     study = write_study(folder, 2, 2).rename(folder / os.fsdecode(b"c\xe9.toml"))
     sweep_here(study, study.with_suffix(".sqlite"), "work", workers=1)
-    monkeypatch.setattr("hevopt.sweeps.run.run_sweep", lambda *_, **__: Progress(0))
+    monkeypatch.setattr("hevopt.sweeps.into_store.run_sweep", lambda *_, **__: Progress(0))
     status, out, err = called(monkeypatch, capsys, study, "--export", folder / "cases.csv")
     assert (status, err) == (0, "") and "8 cases of 8 designs: 8 ok" in out
     store, page = study.with_suffix(".sqlite"), folder / "page.html"
