@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from problems import every_plan, random_problem
+from proofs.run import attack
 
 from hevopt import Battery, ControlTable, Problem, certify, simulate
 from hevopt.bounds import _step_prices_kernels as price_kernels
@@ -51,6 +52,10 @@ def test_prices_that_outgrow_numbers_stay_a_bound():
     assert np.isfinite(prices).all() and prices.max() > 0 and prices[-1] == 0
     for line in (*dual_of_shape(problem, rollout, prices), *costate_dual(problem, rollout)):
         assert line.value_kg <= rollout.cost_kg
+
+
+def test_no_bound_is_above_0_by_what_is_below_the_smallest_normal_number():
+    assert attack(range(702_923, 702_924)) == []
 
 
 @pytest.mark.parametrize("seed", [8, 12, 14, 24])
