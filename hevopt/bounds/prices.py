@@ -19,9 +19,8 @@ hold is  computed g - allowance <= cost as computed of a plan that simulate acce
    (`amplification`). A tangent's slope times the window is off by at most its third power, times the voltage's
    rise over the window. `priced_magnitude` takes both; the prices' own scaling and the sums add a few u more.
 3. The plan's trace is rounded at each step, by at most 2 u x_max and the error of r: sum over t of p_t+1 x_max.
-4. Products below the smallest normal number are off by more than epsilon, all together by less than that number.
-Together  epsilon [(2 T + 48) (|g| + 2 N + 4 S W) + 8 S sum p x_max] + the smallest normal number, about 1e-10 of the
-cost on shipped cycles.
+4. Products below the smallest normal number are off by more, all together by less than it: it is taken off, too.
+Together  epsilon [(2 T + 48) (|g| + 2 N + 4 S W) + 8 S sum p x_max],  about 1e-10 of the cost on shipped cycles.
 """
 
 from collections.abc import Callable
@@ -170,8 +169,7 @@ def dual(
     def lowered(line: Line) -> Line:
         own_kg = abs(line.value_kg - line.scale * constant)
         allowance_kg = many * (own_kg + fallen_kg) + line.scale * rounding_kg
-        underflow_kg = TINY if line.scale > 0 else 0.0
-        return replace(line, value_kg=line.value_kg - allowance_kg - underflow_kg)
+        return replace(line, value_kg=line.value_kg - allowance_kg - TINY * (line.scale > 0))
 
     return sorted(map(lowered, lines), key=lambda line: line.value_kg)
 

@@ -121,8 +121,13 @@ class Files:
                 )
             return
         from hevopt.pages.comparison.collect import Collector, check_steps
+        from hevopt.pages.comparison.room import check_planned
+        from hevopt.studies.solved import strategies_for
 
         check_steps(job.trace)
+        cars, steps = job.cars.cars, len(job.trace.time_s) - 1
+        rows = sum(len(strategies_for(car, job.settings.strategies, {})) for car in cars)
+        check_planned(steps, len(cars), rows)
         self._collector = Collector()
 
     def observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:

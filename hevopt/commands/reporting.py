@@ -14,6 +14,7 @@ from hevopt.files.shown import encodable
 if TYPE_CHECKING:
     from hevopt.pages.comparison.results import Results
 
+_TOO_MUCH = "`hevopt report` reads no more, nothing is saved; ask for fewer cars or strategies, or a shorter cycle"
 _SQLITE = b"SQLite format 3\0"
 
 
@@ -51,12 +52,17 @@ def write_files(results: "Results", page: Path | None, saved: Path | None) -> li
     """Write the page and the saved results, each where asked for; a line for each."""
     from hevopt.files.writing import write_whole
     from hevopt.pages.comparison.page import comparison_page
+    from hevopt.pages.comparison.results import packed
+    from hevopt.pages.comparison.room import check_room
 
     contents = []
+    if saved is not None:
+        text = results.text()
+        check_room(f"--save {saved}", text, _TOO_MUCH)
     if page is not None:
         contents.append(("report", page, comparison_page(results).encode()))
     if saved is not None:
-        contents.append(("results", saved, results.packed()))
+        contents.append(("results", saved, packed(text)))
     for _, path, whole in contents:
         write_whole(path, whole)
     return [f"{what} written to {path}" for what, path, _ in contents]

@@ -1,7 +1,8 @@
 """`hevopt pareto`, `sensitivity` and `reproduction`: many problems solved for one answer."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,11 +18,9 @@ from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
-    from hevopt.car.architecture import Architecture
     from hevopt.driving.cycle import Cycle
     from hevopt.pages.comparison.results import Results
     from hevopt.studies.cars import Cars
-    from hevopt.studies.sensitivity import Effect
     from hevopt.studies.settings import Settings
 
 _OPTIONS = "the command line"
@@ -52,6 +51,7 @@ def pareto(
     ] = None,
 ) -> None:
     """Fuel against NOx: plans over the weight on NOx, and the certified front that none can cross."""
+    from hevopt.commands.forecast import say_how_long
     from hevopt.commands.studies_view import front_notes, front_table, write_front
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies.cars import cars_of
@@ -67,16 +67,10 @@ def pareto(
     cars, trace = cars_of([architecture], settings), load_cycle(cycle)
     if out is not None:
         _check_csv(out, [*cars.cars[0].files, *filter(None, [trace.source])])
+    front = partial(front_of, cars.cars[0], weights=chosen, points=points)
+    say_how_long(trace, lambda piece: front(piece, settings, strategy))
     with Progress() as progress:
-        found = front_of(
-            cars.cars[0],
-            trace,
-            settings,
-            strategy,
-            weights=chosen,
-            points=points,
-            progress=progress,
-        )
+        found = front(trace, settings, strategy, progress=progress)
     if out is not None:
         write_front(out, found)
     if json:
@@ -97,15 +91,20 @@ def sensitivity(
     json: JsonOption = False,
 ) -> None:
     """How fuel and NOx move with mass, resistances, losses, auxiliaries, battery and NOx map."""
+    from hevopt.commands.forecast import say_how_long
     from hevopt.commands.studies_view import SHORTFALL_NOTE, effects_notes, effects_table
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies.cars import cars_of
+    from hevopt.studies.sensitivity import effects_on
     from hevopt.studies.settings import given_of, study_of
 
     settings = study_of(given_of(_OPTIONS, given)).settings
     cars, trace = cars_of([architecture], settings), load_cycle(cycle)
+    car = cars.cars[0]
+    effects_of = partial(effects_on, car, cars.changes[car.name])
+    say_how_long(trace, lambda piece: effects_of(piece, settings, settings.strategies))
     with Progress() as progress:
-        effects = _effects(cars.cars[0], cars, trace, settings, progress, settings.strategies)
+        effects = effects_of(trace, settings, settings.strategies, progress)
     if json:
         found = {"cycle": trace.name, "sensitivity": [effect.as_dict() for effect in effects]}
         write(_json(found | _about(cars, trace)))
@@ -147,6 +146,7 @@ def with_studies(
     """
     from hevopt.pages.comparison.results import ParetoFront, Sensitivity
     from hevopt.studies.fronts import front_of
+    from hevopt.studies.sensitivity import effects_on
 
     wanted = [car for car in cars.cars if car.name in results.cars]
     settings = replace(settings, horizon_s=None)  # of dp and the rules, which look at no preview
@@ -161,7 +161,8 @@ def with_studies(
                 failures[f"{car.name} front"] = error
         for car in wanted if effects else ():
             try:
-                found = _effects(car, cars, trace, settings, progress)
+                changes = cars.changes[car.name]
+                found = effects_on(car, changes, trace, settings, progress=progress)
                 added["sensitivity"] += [Sensitivity.model_validate(e.as_dict()) for e in found]
             except HevoptError as error:
                 failures[f"{car.name} sensitivity"] = error
@@ -169,19 +170,6 @@ def with_studies(
     asked = {"pareto": fronts, "sensitivity": effects}
     update = {name: lines for name, lines in added.items() if asked[name]}
     return results.model_copy(update=update | {"failures": said}), failures
-
-
-def _effects(
-    car: "Architecture",
-    cars: "Cars",
-    trace: "Cycle",
-    settings: "Settings",
-    progress: Progress,
-    strategies: Sequence[str] | None = None,
-) -> list["Effect"]:
-    from hevopt.studies.sensitivity import effects_on
-
-    return effects_on(car, cars.changes[car.name], trace, settings, strategies, progress)
 
 
 def _numbers(option: str, text: str) -> list[float]:

@@ -1,5 +1,7 @@
 """What a long drive will take is said beforehand, from what pieces of it took."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -60,3 +62,18 @@ def test_the_piece_is_one_that_is_driven():
     piece = forecast.piece_of(drive(20_000), 1000)
     assert len(piece.time_s) == 1001
     assert piece.distance_m > 19_900
+
+
+@pytest.mark.parametrize("command", ["pareto", "sensitivity"])
+def test_studies_of_long_drives_say_it_too(command, hevopt, monkeypatch):
+    """Told by a drive that counts as long, and pieces that are short enough for a test."""
+    for name, steps in (("_LONG_STEPS", 60), ("_SHORT_PIECE", 20), ("_LONG_PIECE", 40)):
+        monkeypatch.setattr(forecast, name, steps)
+    monkeypatch.setattr(forecast, "_WORTH_SAYING_S", 0.0)
+    speeds = [min(2 * n, 40, 2 * (80 - n)) for n in range(81)]
+    rows = "".join(f"{n},{v}\n" for n, v in enumerate(speeds))
+    Path("short.csv").write_text("time_s,speed_kmh\n" + rows)
+    options = ("--points", "2") if command == "pareto" else ("--strategies", "conventional")
+    seen = hevopt(command, "C2", "--cycle", "short.csv", *options)
+    assert seen.status == 0
+    assert "hevopt: 80 steps will take about" in seen.err

@@ -264,6 +264,15 @@ class Results(FileModel):
     pareto: list[ParetoFront] | None = None
     sensitivity: list[Sensitivity] | None = None
 
+    def text(self) -> bytes:
+        """As JSON."""
+        return dumped_json(self.model_dump()).encode()
+
     def packed(self) -> bytes:
         """The contents of the file; the same results give the same bytes."""
-        return gzip.compress(dumped_json(self.model_dump()).encode(), compresslevel=6, mtime=0)
+        return packed(self.text())
+
+
+def packed(text: bytes) -> bytes:
+    """The contents of a file with results as JSON."""
+    return gzip.compress(text, compresslevel=6, mtime=0)

@@ -10,9 +10,8 @@ from hevopt.errors import DataError
 from hevopt.files.lookup import loaded_json, read_bytes
 from hevopt.files.shown import printable
 from hevopt.pages.comparison.results import FORMAT, CarFigures, Results, Row
+from hevopt.pages.comparison.room import MEGABYTES_MAX, check_room
 
-# Unpacked; a page of 20 000 steps and 65 rows takes 80 MB and 15 million numbers.
-_MEGABYTES_MAX, _VALUES_MAX, _LISTS_MAX, _TEXTS_MAX = 200, 20_000_000, 2_000_000, 4_000_000
 _ADVICE = "give a file written by hevopt compare --save"
 _MAGIC = b"\x1f\x8b"
 _FAULTS_LISTED = 5
@@ -110,7 +109,7 @@ def _faults_of_row(results: Results, row: Row) -> list[str]:
 def _contents(path: Path) -> dict[str, Any]:
     try:
         text = _unpacked(path)
-        _check_room(path, text)
+        check_room(path, text, _ADVICE)
         contents = loaded_json(text.decode())
     except (zlib.error, ValueError, RecursionError):
         raise DataError(f"{path}: neither JSON nor JSON packed with gzip; {_ADVICE}") from None
@@ -120,23 +119,11 @@ def _contents(path: Path) -> dict[str, Any]:
 
 
 def _unpacked(path: Path) -> bytes:
-    contents = read_bytes(path, _MEGABYTES_MAX)
+    contents = read_bytes(path, MEGABYTES_MAX)
     if not contents.startswith(_MAGIC):
         return contents
     unpacker = zlib.decompressobj(wbits=31)
-    text = unpacker.decompress(contents, _MEGABYTES_MAX * 1_000_000)
+    text = unpacker.decompress(contents, MEGABYTES_MAX * 1_000_000)
     if not unpacker.eof:
-        raise DataError(f"{path}: cut short, or beyond {_MEGABYTES_MAX} MB unpacked; {_ADVICE}")
+        raise DataError(f"{path}: cut short, or beyond {MEGABYTES_MAX} MB unpacked; {_ADVICE}")
     return text
-
-
-def _check_room(path: Path, text: bytes) -> None:
-    """DataError where JSON would take many times its own size: of lists, names and short numbers there are few."""
-    counted = (
-        ("values", text.count(b","), _VALUES_MAX),
-        ("lists and tables", text.count(b"[") + text.count(b"{"), _LISTS_MAX),
-        ("texts", text.count(b'"') // 2, _TEXTS_MAX),
-    )
-    for what, count, most in counted:
-        if count > most:
-            raise DataError(f"{path}: {count} {what}; allowed: up to {most}; {_ADVICE}")

@@ -28,7 +28,7 @@ from hevopt.pages.sweep.drawing import (
 from hevopt.pages.sweep.effects import Effect, effect, is_log, is_numeric
 from hevopt.pages.sweep.verdict import Group, groups_of, shown_value, verdict
 from hevopt.studies.provenance import code_digest, versions
-from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
+from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending, Failure
 from hevopt.sweeps.store.reading import Record
 
 PRUNED_LISTED = 100
@@ -160,6 +160,7 @@ def _pruned(sweep: Sweep) -> list[dict[str, Any]]:
 
 def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
     parameters = {k: v for k, v in record.parameters.items() if k != NOX_WEIGHT}
+    failure = record.failure or Failure("no reason given")
     return {
         "design": record.design,
         "weight": record.nox_weight,
@@ -167,8 +168,8 @@ def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
         "cycle": record.cycle,
         "strategy": record.strategy,
         "outcome": str(record.ending),
-        "error": printable(record.failure.headline),
-        "details": record.failure.details,
+        "error": printable(failure.headline),
+        "details": failure.details,
     }
 
 
