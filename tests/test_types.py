@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 # Rooms with faults left, and how many mypy finds in each today: lower or strike a number, never raise it.
 OPEN = {
-    "measured": 208, "pages": 64, "sweeps": 63, "forward": 42, "reproduction": 16, "powertrain": 7,
+    "measured": 208, "pages": 62, "sweeps": 63, "forward": 42, "reproduction": 16,
 }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from hevopt.car.driveline import Driveline
 from hevopt.car.engine import Engine
 from hevopt.car.machine import Machine
 from hevopt.car.transmission import Gearbox
@@ -20,26 +21,9 @@ from hevopt.problem.battery import Battery
 Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
 
 
-CouplingKind = Literal[
-    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
-]
-
-
-@dataclass(frozen=True, slots=True)
-class Coupling:
-    """How the machine joins the shafts; see couplings.py."""
-
-    kind: CouplingKind
-    second_clutch: bool
-    machine_ratio: float
-    machine_efficiency: float
-    disconnects_above_speed_max: bool
-    machine_shift_fuel_kg: float
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Architecture(Shown):
-    """A complete car: every component, the coupling and the functions it may use.
+    """A complete car: every component, how they are joined and the functions it may use.
 
     soc_end: least state of charge at the end of a cycle
     contents: keys and values as read, changes made, the components' tables in place of their names
@@ -55,7 +39,7 @@ class Architecture(Shown):
     battery: Battery
     soc_start: float
     soc_end: float
-    coupling: Coupling
+    driveline: Driveline
     functions: frozenset[str]
     gear: Literal["cycle", "free"]
     contents: Mapping[str, Any]
@@ -64,7 +48,7 @@ class Architecture(Shown):
     def _facts(self) -> dict[str, object]:
         return {
             "name": self.name,
-            "coupling": self.coupling.kind,
+            "driveline": self.driveline.kind,
             "mass_kg": self.vehicle.mass_kg,
             "engine": self.engine.name,
             "machines": tuple(machine.name for machine in self.machines),

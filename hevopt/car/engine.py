@@ -10,6 +10,7 @@ The factor may be called that of displacement, torque or power: with speeds unch
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,17 +77,8 @@ class Engine(Shown):
 
         Of the closest speeds that a measured map knows where it knows nothing: no control is possible there.
         """
-        speeds = np.linspace(self.full_load_speed_radps[0], self.speed_max_radps, 101)[:, None]
-        torques = self.full_load_nm(speeds) * np.linspace(0.01, 1.0, 100)
-        fuel = self.fuel_kgps(torques, speeds)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            efficiency = torques * speeds / np.where(fuel > 0, fuel, np.nan)
-        efficiency = np.where(np.isfinite(efficiency), efficiency, -1.0)
-        best, known = np.argmax(efficiency, axis=1), (efficiency >= 0).any(axis=1)
-        known |= ~known.any()
-        best_nm: Array = np.interp(
-            speed_radps, speeds[known, 0], torques[np.arange(len(speeds)), best][known]
-        )
+        speeds, torques = _best_line(self)
+        best_nm: Array = np.interp(speed_radps, speeds, torques)
         return best_nm
 
     def scaled(self, factor: float) -> "Engine":
@@ -98,3 +90,17 @@ class Engine(Shown):
             full_load_torque_nm=factor * self.full_load_torque_nm,
             law=self.law.scaled(factor),
         )
+
+
+@lru_cache(maxsize=64)
+def _best_line(engine: Engine) -> tuple[Array, Array]:
+    """(speed,) speeds and the torque of highest efficiency at each."""
+    speeds = np.linspace(engine.full_load_speed_radps[0], engine.speed_max_radps, 101)[:, None]
+    torques = engine.full_load_nm(speeds) * np.linspace(0.01, 1.0, 100)
+    fuel = engine.fuel_kgps(torques, speeds)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        efficiency = torques * speeds / np.where(fuel > 0, fuel, np.nan)
+    efficiency = np.where(np.isfinite(efficiency), efficiency, -1.0)
+    best, known = np.argmax(efficiency, axis=1), (efficiency >= 0).any(axis=1)
+    known |= ~known.any()
+    return speeds[known, 0], torques[np.arange(len(speeds)), best][known]

@@ -4,7 +4,8 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, model_validator
 
-from hevopt.car.architecture import CouplingKind, Function
+from hevopt.car.architecture import Function
+from hevopt.car.templates import CouplingKind
 from hevopt.car_files.fields import Description, Fraction, KeysOfKind, Name, Named, Ratio, Table
 from hevopt.files.toml import FileModel
 

@@ -4,7 +4,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from hevopt.car.architecture import Architecture, Coupling
+from hevopt.car.architecture import Architecture
+from hevopt.car.driveline import Driveline
+from hevopt.car.machine import Machine
+from hevopt.car.templates import TEMPLATES, Options
+from hevopt.car.transmission import Gearbox
 from hevopt.car_files.architecture import ArchitectureFile, CouplingFile
 from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
@@ -49,28 +53,36 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
 
     battery, soc = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
     gearbox = part("gearbox", GearboxFile, gearbox_of)
-    if data.coupling.kind == "even_shaft" and len(gearbox.ratios) < 3:
-        raise DataError(
-            f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
-            "or more; choose another gearbox or kind"
-        )
+    vehicle = part("car", CarFile, lambda file: vehicle_of(file, data.hybrid_mass_kg))
+    engine = part("engine", EngineFile, engine_of)
+    machine = part("machine", MachineFile, machine_of)
     car = Architecture(
         name=data.name,
         description=data.description,
-        vehicle=part("car", CarFile, lambda file: vehicle_of(file, data.hybrid_mass_kg)),
-        engine=part("engine", EngineFile, engine_of),
+        vehicle=vehicle,
+        engine=engine,
         gearbox=gearbox,
-        machines=(part("machine", MachineFile, machine_of),),
+        machines=(machine,),
         battery=battery,
         soc_start=soc.start,
         soc_end=soc.start if soc.end is None else soc.end,
-        coupling=_coupling(data.coupling),
+        driveline=_driveline(path, data, gearbox, machine),
         functions=frozenset(data.functions),
         gear="cycle",
         contents=contents,
         files=tuple(files),
     )
     return car.with_free_gear() if data.gear == "free" else car
+
+
+def _driveline(path: Path, data: ArchitectureFile, gearbox: Gearbox, machine: Machine) -> Driveline:
+    kind = data.coupling.kind
+    if kind == "even_shaft" and len(gearbox.ratios) < 3:
+        raise DataError(
+            f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
+            "or more; choose another gearbox or kind"
+        )
+    return TEMPLATES[kind](kind, _options(data.coupling), gearbox, machine)
 
 
 def sorted_changes(
@@ -127,9 +139,8 @@ def _place(place: str, changes: Iterable[str]) -> str:
     return f"{place}, with {changed} changed" if changed else place
 
 
-def _coupling(data: CouplingFile) -> Coupling:
-    return Coupling(
-        data.kind,
+def _options(data: CouplingFile) -> Options:
+    return Options(
         bool(data.second_clutch),
         data.machine_ratio or 1.0,
         data.machine_efficiency or 1.0,

@@ -3,135 +3,147 @@
 Of every control they would take ten times the memory of all that a strategy reads; a plan has one control per step.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hevopt.car.architecture import Architecture
-from hevopt.car.transmission import output_torque_nm
-from hevopt.display.facts import Shown
-from hevopt.driving.demand import Demand
-from hevopt.powertrain.balance import Balance, balance
-from hevopt.powertrain.joint import Joint
+from hevopt.car.balance import joints_of
+from hevopt.car.driveline import BRAKE, ENGINE, State
+from hevopt.car.parts import WHEEL
+from hevopt.powertrain.branches import Driven, Piece
+from hevopt.powertrain.operation import Setting, completed, flowing, setting
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.flows import Flows
 
-Array = NDArray[np.float64]
 _NAMES = (
-    "engine_torque_nm", "engine_speed_radps", "machine_torque_nm", "machine_speed_radps", "fuel_power_w",
-    "engine_loss_w", "engine_inertia_w", "machine_electric_w", "machine_loss_w", "machine_inertia_w",
-    "machine_upstream", "machine_shared", "clutch_in_w", "clutch_loss_w", "gearbox_out_w", "gearbox_loss_w",
-    "machine_gear_out_w", "machine_gear_loss_w", "brake_power_w", "wheel_power_w", "auxiliary_power_w",
+    "engine_torque_nm", "engine_speed_radps", "fuel_power_w", "engine_loss_w", "engine_inertia_w",
+    "machine_power_w", "machine_electric_w", "machine_loss_w", "machine_inertia_w",
+    "clutch_loss_w", "gearbox_loss_w", "gear_loss_w", "brake_power_w", "wheel_power_w", "auxiliary_power_w",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Way(Shown):
-    """A joint, and the (time, level) machine torques of its controls."""
-
-    joint: Joint
-    machine_nm: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PowerFlows(Flows):
-    """Of the controls of all ways, those of the first way first."""
+    """Of the controls of all branches, those of the first branch first."""
 
-    architecture: Architecture
-    demand: Demand
-    ways: tuple[Way, ...]
+    steps: int
+    branches: tuple[Driven, ...]
+    machines: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Array:
-        if name not in _NAMES:
+        if name not in self._names:
             raise KeyError(name)
-        parts = [
-            np.broadcast_to(self._of(way.joint, way.machine_nm)[name], way.machine_nm.shape)
-            for way in self.ways
-        ]
-        return np.hstack(parts)
+        columns = sum(len(branch.labels) for branch in self.branches)
+        whole, first = np.zeros((self.steps, columns)), 0
+        for branch in self.branches:
+            width = len(branch.labels)
+            for piece in branch.pieces:
+                step = piece.here.shafts.step
+                whole[step, first : first + width] = self._of(piece.here, piece.given)[name]
+            first += width
+        return whole
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_NAMES)
+        return iter(self._names)
 
     def __len__(self) -> int:
-        return len(_NAMES)
+        return len(self._names)
 
-    def along(self, control: NDArray[np.int64]) -> dict[str, Array]:
-        """name -> (time,) of one control per step."""
-        steps, first = np.arange(len(control)), 0
-        found = {name: np.empty(len(control)) for name in _NAMES}
-        for way in self.ways:
-            level, width = control - first, way.machine_nm.shape[1]
-            taken = (level >= 0) & (level < width)
-            first += width
-            if taken.any():
-                torque = way.machine_nm[steps, np.clip(level, 0, width - 1)]
-                for name, flow in self._of(way.joint, torque[:, None]).items():
-                    found[name][taken] = np.broadcast_to(flow, (len(control), 1))[taken, 0]
+    @property
+    def _names(self) -> tuple[str, ...]:
+        own = (f"{name}_{what}" for name in self.machines for what in ("torque_nm", "speed_radps"))
+        return (*_NAMES, *own)
+
+    def states(self, control: Indices) -> list[State]:
+        """The state of the driveline at each step of a plan."""
+        widths = [len(branch.labels) for branch in self.branches]
+        owner = np.searchsorted(np.cumsum(widths), control, "right")
+        return [self.branches[n].state for n in owner]
+
+    def given(self, control: Indices) -> dict[str, Array]:
+        """actuator -> (time,) torque that the plan gives it, NaN where it gives none."""
+        found: dict[str, Array] = {}
+        for piece, state, level in self._taken(control):
+            for name, torque in piece.given.items():
+                values = found.setdefault(name, np.full(len(control), np.nan))
+                values[piece.here.shafts.step[state]] = torque[state, level]
         return found
 
-    def _of(self, joint: Joint, machine_nm: Array) -> dict[str, Array]:
-        """name -> flows of (time, level) torques of the machine, some (time, 1)."""
-        engine_kgps = np.zeros_like(machine_nm)
-        torques = balance(self.architecture, self.demand, joint, machine_nm)
-        if joint.engine_on:
-            engine_kgps = self.architecture.engine.fuel_kgps(
-                torques.engine, joint.engine_speed_radps[:, None]
-            )
-        loss_w = self.architecture.machines[0].loss_w(
-            machine_nm, joint.machine_speed_radps[:, None]
-        )
-        return _flows(
-            self.architecture, self.demand, joint, torques, np.nan_to_num(engine_kgps),
-            np.nan_to_num(loss_w),
-        )  # fmt: skip
+    def along(self, control: Indices) -> dict[str, Array]:
+        """name -> (time,) of one control per step."""
+        found = {name: np.zeros(len(control)) for name in self._names}
+        for piece, state, level in self._taken(control):
+            here, step = piece.here, piece.here.shafts.step[state]
+            some = setting(here.car, here.way, here.shafts.picked(state))
+            given = {name: torque[state, level][:, None] for name, torque in piece.given.items()}
+            for name, flow in self._of(some, given).items():
+                found[name][step] = np.broadcast_to(flow, (len(step), 1))[:, 0]
+        return found
+
+    def _taken(self, control: Indices) -> Iterator[tuple[Piece, Indices, Indices]]:
+        """The pieces that a plan drives, the states of each that it takes, and the level at each."""
+        first = 0
+        for branch in self.branches:
+            level, width = control - first, len(branch.labels)
+            first += width
+            for piece in branch.pieces:
+                of_piece = level[piece.here.shafts.step]
+                state = np.flatnonzero((of_piece >= 0) & (of_piece < width))
+                if len(state):
+                    yield piece, state, of_piece[state]
+
+    def _of(self, here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
+        """name -> flows of (state, level) torques given, some (state, 1)."""
+        torques = completed(here, given)
+        known = [*here.way.chosen, *([here.way.slack] if here.way.slack is not None else [])]
+        names = [joint.name for joint in joints_of(here.way)]
+        joints = here.torques.solve({name: torques[name] for name in known}, names)
+        found = _flows(here, torques)
+        for loss in ("clutch", "gearbox", "gear"):
+            found[f"{loss}_loss_w"] = np.zeros((1, 1))
+        for joint in joints_of(here.way):
+            entering_w = joints[joint.name] * here.torques.sense_radps(joint)[:, None]
+            name = f"{joint.loss}_loss_w"
+            if not joint.speed:
+                found[name] = found[name] + entering_w
+            elif not joint.lossless:
+                eta = here.shafts.at(joint.efficiency)
+                eta = eta[:, None] if isinstance(eta, np.ndarray) else eta
+                found[name] = found[name] + np.where(
+                    entering_w > 0, entering_w * (1 - eta), entering_w * (1 - 1 / eta)
+                )
+        for name in self.machines:
+            none = np.zeros((1, 1))
+            found[f"{name}_torque_nm"] = torques.get(name, none)
+            found[f"{name}_speed_radps"] = here.speed_radps(name)[:, None]
+        return found
 
 
-def _flows(
-    architecture: Architecture,
-    demand: Demand,
-    joint: Joint,
-    torques: Balance,
-    fuel_kgps: Array,
-    machine_loss_w: Array,
-) -> dict[str, Array]:
-    """Powers and losses. Clutch, gears, machine and brakes lose by laws of their own, so that the balances of
-    shafts and car are checks; the engine's loss is what fuel power is not turned into work."""
-    engine_speed = joint.engine_speed_radps[:, None]
-    machine_speed = joint.machine_speed_radps[:, None]
-    wheel_speed = demand.wheel_speed_radps[:, None]
-    ratio, efficiency = joint.gear_ratio[:, None], joint.gear_efficiency[:, None]
-    own = ~(joint.upstream | joint.shared)[:, None]
-    fuel_power = fuel_kgps * architecture.engine.heating_value_jpkg
-    machine_power = torques.machine * machine_speed
-    engine_inertia = architecture.engine.inertia_kgm2 * joint.engine_accel_radps2[:, None]
-    machine_inertia = architecture.machines[0].inertia_kgm2 * joint.machine_accel_radps2[:, None]
-    own_loss = _gear_loss_w(torques.machine_net * machine_speed, joint.machine_efficiency[:, None])
+def _flows(here: Setting, torques: Mapping[str, Array]) -> dict[str, Array]:
+    """Powers and losses. Joints, machines and brakes lose by laws of their own, so that the balances of driveline
+    and car are checks; the engine's loss is what fuel power is not turned into work."""
+    shafts, burnt, none = here.shafts, flowing(here, torques), np.zeros((1, 1))
+    engine_speed = here.engine_radps[:, None]
+    engine_torque = torques.get(ENGINE, none)
+    heating_value = 0.0 if here.car.engine is None else here.car.engine.heating_value_jpkg
+    fuel_power = burnt.fuel_kgps * heating_value
+    machine_w = none
+    for name in here.machines:
+        machine_w = machine_w + torques[name] * here.speed_radps(name)[:, None]
+    engine_inertia_w, machine_inertia_w = (power[:, None] for power in shafts.inertia_w)
+    wheel_speed = shafts.speed_radps[WHEEL][:, None]
     return {
-        "engine_torque_nm": torques.engine,
+        "engine_torque_nm": engine_torque,
         "engine_speed_radps": engine_speed,
-        "machine_torque_nm": torques.machine,
-        "machine_speed_radps": machine_speed,
         "fuel_power_w": fuel_power,
-        "engine_loss_w": fuel_power - torques.engine * engine_speed,
-        "engine_inertia_w": engine_inertia * engine_speed,
-        "machine_electric_w": machine_power + machine_loss_w,
-        "machine_loss_w": machine_loss_w,
-        "machine_inertia_w": machine_inertia * machine_speed,
-        "machine_upstream": joint.upstream[:, None].astype(float),
-        "machine_shared": joint.shared[:, None].astype(float),
-        "clutch_in_w": torques.clutch * engine_speed,
-        "clutch_loss_w": torques.clutch * joint.slip_radps[:, None],
-        "gearbox_out_w": output_torque_nm(torques.gearbox_in, ratio, efficiency) * wheel_speed,
-        "gearbox_loss_w": _gear_loss_w(torques.gearbox_in * ratio * wheel_speed, efficiency),
-        "machine_gear_out_w": torques.wheel_own * wheel_speed,
-        "machine_gear_loss_w": np.where(own, own_loss, 0.0),
-        "brake_power_w": torques.brake * wheel_speed,
-        "wheel_power_w": demand.wheel_power_w[:, None],
-        "auxiliary_power_w": np.full((1, 1), architecture.vehicle.auxiliary_power_w),
+        "engine_loss_w": fuel_power - engine_torque * engine_speed,
+        "engine_inertia_w": engine_inertia_w,
+        "machine_power_w": machine_w,
+        "machine_electric_w": burnt.machines_w,
+        "machine_loss_w": burnt.machines_w - machine_w,
+        "machine_inertia_w": machine_inertia_w,
+        "brake_power_w": -torques[BRAKE] * wheel_speed,
+        "wheel_power_w": shafts.wheel_nm[:, None] * wheel_speed,
+        "auxiliary_power_w": np.full((1, 1), here.car.vehicle.auxiliary_power_w),
     }
-
-
-def _gear_loss_w(input_w: Array, efficiency: Array) -> Array:
-    return np.where(input_w > 0, input_w * (1 - efficiency), input_w * (1 - 1 / efficiency))

@@ -1,15 +1,17 @@
 """Why a control cannot be used: limits of the parts, and functions the architecture does not have."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car.architecture import Architecture
-from hevopt.driving.demand import Demand
-from hevopt.powertrain.balance import Balance
-from hevopt.powertrain.joint import Joint
+from hevopt.car.balance import directions, joints_of
+from hevopt.car.driveline import BRAKE, ENGINE, State
+from hevopt.car.parts import WHEEL
+from hevopt.powertrain.operation import Setting
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.table import Reject
 
-Array = NDArray[np.float64]
 Bits = NDArray[np.uint16]
 
 _TORQUE_TOLERANCE_NM = 1e-6
@@ -17,64 +19,88 @@ _POWER_TOLERANCE_W = 1e-6
 _BOOST_SLACK_NM = 1e-3
 
 
-def limit_rejects(
-    architecture: Architecture, demand: Demand, joint: Joint, torques: Balance
-) -> Bits:
-    """Limits of engine, machine and shafts, whatever the architecture may do."""
+def limit_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
+    """Limits of engine, machines and shafts, whatever the architecture may do; torques: (state, level)."""
     tolerance = _TORQUE_TOLERANCE_NM
-    engine, machine = architecture.engine, architecture.machines[0]
-    engine_speed, speed = joint.engine_speed_radps[:, None], joint.machine_speed_radps[:, None]
-    full = engine.full_load_nm(engine_speed) if joint.engine_on else 0.0
-    limit = machine.limit_nm(speed)
-    torque = np.abs(torques.machine)
-    wanted = demand.wheel_torque_nm[:, None]
-    unmet = np.where(wanted > 0, np.abs(torques.brake), -torques.brake) > 10 * tolerance
+    found = _engine_rejects(here, torques) if ENGINE in torques else np.zeros((1, 1), np.uint16)
+    for name, machine in here.machines.items():
+        speed = np.abs(here.speed_radps(name))[:, None]
+        found = (
+            found
+            | bits(
+                Reject.MACHINE_LIMIT, np.abs(torques[name]) > machine.limit_nm(speed) + tolerance
+            )
+            | bits(Reject.MACHINE_SPEED, speed > machine.speed_max_radps)
+        )
+    wanted, brake = here.shafts.wheel_nm[:, None], torques[BRAKE]
+    unmet = np.where(wanted > 0, np.abs(brake), brake) > 10 * tolerance
+    if not _standing(here).all():
+        found = found | bits(Reject.NO_PATH, ~_standing(here)[:, None] & unmet)
+    for joint in joints_of(here.way):
+        if joint.pushes:
+            found = found | bits(Reject.NO_PATH, torques[joint.name] < -tolerance)
+    for clutch in here.way.freed:
+        if set(clutch.freed()) <= set(here.way.shafts):
+            speeds = [c * here.shafts.speed_radps[s] for s, c in clutch.freed().items()]
+            found = found | bits(Reject.NO_PATH, np.sum(speeds, axis=0)[:, None] < -tolerance)
+    for torque in torques.values() if len(directions(here.way)) > 1 else ():
+        unsolved = np.isnan(torque)
+        if unsolved.any():
+            found = found | bits(Reject.NO_PATH, unsolved)
+    return found
+
+
+def _engine_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
+    engine, speed, tolerance = here.car.engine, here.engine_radps[:, None], _TORQUE_TOLERANCE_NM
+    torque, least = torques[ENGINE], here.least_nm[:, None]
+    slow = here.way.tied & (speed < engine.idle_radps * (1 - 1e-12))
     return (
-        bits(Reject.ENGINE_TORQUE, torques.engine > full + tolerance)
-        | bits(Reject.ENGINE_TORQUE, torques.engine < torques.least_engine - tolerance)
-        | bits(Reject.ENGINE_SPEED, engine_speed > engine.speed_max_radps * (1 + 1e-12))
-        | bits(Reject.MACHINE_LIMIT, torque > limit + tolerance)
-        | bits(Reject.MACHINE_SPEED, joint.connected[:, None] & (speed > machine.speed_max_radps))
-        | bits(Reject.NO_PATH, ~joint.connected[:, None] & (torque > tolerance))
-        | bits(Reject.NO_PATH, joint.slipping[:, None] & (torques.clutch < -tolerance))
-        | bits(Reject.NO_PATH, ~joint.possible[:, None] | unmet)
+        bits(Reject.ENGINE_TORQUE, torque > engine.full_load_nm(speed) + tolerance)
+        | bits(Reject.ENGINE_TORQUE, torque < least - tolerance)
+        | bits(Reject.ENGINE_SPEED, slow | (speed > engine.speed_max_radps * (1 + 1e-12)))
     )
 
 
 def function_rejects(
-    architecture: Architecture,
-    demand: Demand,
-    joint: Joint,
-    torques: Balance,
-    battery_power_w: Array,
+    here: Setting, state: State, torques: Mapping[str, Array], battery_power_w: Array
 ) -> Bits:
     """Table 1: what the architecture's functions leave of the physically possible.
 
     start_stop            engine at rest while the car stands
-    power_management      engine at rest, or dragged, while the machine drives; assistance
-    nox_cut               assistance by the machine while the engine drives
+    power_management      engine at rest, or dragged, while a machine drives; assistance
+    nox_cut               assistance by a machine while the engine drives
     e_boost               assistance only beyond the engine's full load, or where a measured map ends below it
     regenerative_braking  charging while the car is braked
     Charging by the engine while it runs needs no function: any alternator does that.
     """
-    has = architecture.functions.__contains__
-    wanted = demand.wheel_torque_nm[:, None]
-    standing = demand.wheel_speed_radps[:, None] == 0
-    banned = np.zeros(torques.machine.shape, dtype=bool)
-    if not joint.engine_on:
-        banned |= standing & (not has("start_stop"))
-        banned |= ~standing & (not has("power_management"))
+    has = here.car.functions.__contains__
+    wanted, standing = here.shafts.wheel_nm[:, None], _standing(here)[:, None]
+    banned = np.zeros((1, 1), dtype=bool)
+    if not state.engine_on:
+        if here.car.engine is not None:
+            banned = (standing & (not has("start_stop"))) | (
+                ~standing & (not has("power_management"))
+            )
     elif not has("power_management"):
-        motoring = torques.machine > _TORQUE_TOLERANCE_NM
-        banned |= motoring & (torques.engine <= 0)
+        motoring = np.zeros((1, 1), dtype=bool)
+        for name in here.machines:
+            motoring = motoring | (torques[name] > _TORQUE_TOLERANCE_NM)
+        banned = motoring & (torques[ENGINE] <= 0)
         if not has("nox_cut"):
-            speed = joint.engine_speed_radps[:, None]
-            full = architecture.engine.covered_nm(speed)
-            banned |= motoring & ~(has("e_boost") & (torques.engine > full - _BOOST_SLACK_NM))
+            full = here.car.engine.covered_nm(here.engine_radps[:, None])
+            banned = banned | motoring & ~(
+                has("e_boost") & (torques[ENGINE] > full - _BOOST_SLACK_NM)
+            )
     if not has("regenerative_braking"):
-        banned |= (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)
+        banned = banned | (wanted < 0) & (battery_power_w < -_POWER_TOLERANCE_W)
     return bits(Reject.FUNCTION, banned)
 
 
-def bits(reason: Reject, where: NDArray[np.bool_]) -> Bits:
-    return np.where(where, np.uint16(reason), np.uint16(0))
+def bits(reason: Reject, where: Flags) -> Bits:
+    """The reason's bit where it holds."""
+    return where.astype(np.uint16) * np.uint16(reason)
+
+
+def _standing(here: Setting) -> Flags:
+    standing: Flags = here.shafts.speed_radps[WHEEL] == 0
+    return standing

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
 from hevopt.driving.demand import Demand
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.table import REJECT_WORDS, Reject
 
-Array = NDArray[np.float64]
 Bits = NDArray[np.uint16]
 _LISTED = 12
 
@@ -15,7 +15,7 @@ _LISTED = 12
 def shortfall_message(
     architecture: Architecture,
     demand: Demand,
-    stuck: NDArray[np.bool_],
+    stuck: Flags,
     missing: Array,
     reject: Bits,
 ) -> str:
@@ -42,7 +42,7 @@ def shortfall_message(
     )
 
 
-def _advice(demand: Demand, stuck: NDArray[np.bool_], missing: Array, reject: Bits) -> list[str]:
+def _advice(demand: Demand, stuck: Flags, missing: Array, reject: Bits) -> list[str]:
     """What to do, by what is wrong: the cycle's gear, too little torque, or a limit."""
     neutral = stuck & (demand.gear == 0) & (demand.wheel_torque_nm > 0)
     weak, limited = stuck & ~neutral & (missing > 0), stuck & ~neutral & (missing == 0)

@@ -144,37 +144,21 @@ def _residuals(table: ControlTable, f: Mapping[str, Array], power_w: Array) -> d
     residuals = {"battery": f["battery_chemical_w"] - power_w - f["battery_loss_w"]}
     if not table.flows:
         return residuals
-    engine_power = f["engine_torque_nm"] * f["engine_speed_radps"]
-    machine_power = f["machine_torque_nm"] * f["machine_speed_radps"]
-    machine_net = machine_power - f["machine_inertia_w"]
-    upstream, shared = f["machine_upstream"], f["machine_shared"]
-    clutch_out = f["clutch_in_w"] - f["clutch_loss_w"]
-    own = 1.0 - upstream - shared
+    engine_w = f["engine_torque_nm"] * f["engine_speed_radps"]
+    inertia_w = f["engine_inertia_w"] + f["machine_inertia_w"]
+    lost_w = f["clutch_loss_w"] + f["gearbox_loss_w"] + f["gear_loss_w"] + f["brake_power_w"]
     return residuals | {
-        "engine": f["fuel_power_w"] - engine_power - f["engine_loss_w"],
-        "crankshaft": engine_power
-        - f["engine_inertia_w"]
-        + upstream * machine_net
-        - f["clutch_in_w"],
-        "machine": f["machine_electric_w"] - machine_power - f["machine_loss_w"],
-        "machine gear": own * machine_net - f["machine_gear_out_w"] - f["machine_gear_loss_w"],
-        "gearbox": clutch_out + shared * machine_net - f["gearbox_out_w"] - f["gearbox_loss_w"],
-        "wheels": f["gearbox_out_w"]
-        + f["machine_gear_out_w"]
-        - f["brake_power_w"]
-        - f["wheel_power_w"],
+        "engine": f["fuel_power_w"] - engine_w - f["engine_loss_w"],
+        "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
+        "driveline": engine_w + f["machine_power_w"] - inertia_w - lost_w - f["wheel_power_w"],
         "electric bus": power_w - f["machine_electric_w"] - f["auxiliary_power_w"],
         "whole car": f["fuel_power_w"]
         + f["battery_chemical_w"]
         - f["wheel_power_w"]
         - f["auxiliary_power_w"]
-        - f["brake_power_w"]
-        - f["engine_inertia_w"]
-        - f["machine_inertia_w"]
+        - inertia_w
         - f["engine_loss_w"]
-        - f["clutch_loss_w"]
-        - f["gearbox_loss_w"]
+        - lost_w
         - f["machine_loss_w"]
-        - f["machine_gear_loss_w"]
         - f["battery_loss_w"],
     }

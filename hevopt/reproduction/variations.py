@@ -94,7 +94,7 @@ def braking_share(share: float) -> Callable[[Problem], Problem]:
 
     def limited(problem: Problem) -> Problem:
         flows, wheel_w = problem.table.flows, problem.table.signals.wheel_power_w[:, None]
-        taken_w = -flows["machine_torque_nm"] * flows["machine_speed_radps"]
+        taken_w = -flows["machine_power_w"]
         return without(problem, (wheel_w < 0) & (taken_w > np.maximum(-share * wheel_w, 0)))
 
     return limited
@@ -120,7 +120,7 @@ def _machine_loss(factor: float) -> Callable[[Architecture], dict[str, float]]:
         efficiency = car.contents["machine"].get("efficiency")
         if efficiency is None:
             return _times(car, "machine", _LOSSES, factor)
-        if car.coupling.kind == "none":
+        if car.driveline.kind == "none":
             return {}
         return {"machine.efficiency": less_loss(efficiency, factor)}
 
@@ -149,7 +149,7 @@ def _driveline(car: Architecture) -> dict[str, float]:
 
 
 def _alternator_as_belt(car: Architecture) -> dict[str, float]:
-    if car.coupling.kind != "none":
+    if car.driveline.kind != "none":
         return {}
     return {"machine.efficiency": load_architecture("B").machines[0].loss.efficiency}
 

@@ -9,7 +9,7 @@ from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import UnknownNoxError
 from hevopt.files.shown import printable
-from hevopt.powertrain.balance import Around
+from hevopt.powertrain.levels import Around
 from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_problem, torques_of
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate

@@ -39,7 +39,8 @@ def test_lowest_engine_speed_and_cost_of_a_change_are_kept(name):
     labels = [problem.table.controls[c] for c in trajectory.control]
     gears = np.array([label.engine_gear for label in labels])
     speed = trajectory.flows["engine_speed_radps"] / RPM
-    driven = (gears > 1) & (speed > 0) & (trajectory.flows["clutch_in_w"] != 0)
+    wheel_rpm = problem.table.signals.speed_mps / car.vehicle.tyre_radius_m / RPM
+    driven = (gears > 1) & (speed > 0) & np.isclose(speed, car.gearbox.ratios[gears] * wheel_rpm)
     assert driven.any() and speed[driven].min() >= 1000 - 1e-6
     changes = np.count_nonzero(np.diff([1, *gears]))
     on = np.array([True, *(label.engine_on for label in labels)])

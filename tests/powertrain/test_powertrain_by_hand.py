@@ -205,7 +205,7 @@ def test_clutch_open_deceleration_parts_the_engine_which_idles():
         on = usable(table, engine_on=True)
         assert np.allclose(table.flows["engine_speed_radps"][0, on], IDLE, rtol=1e-12)
         if name in ("A", "C1", "D"):
-            assert (table.flows["gearbox_out_w"][0, on] == 0).all()
+            assert (table.flows["gearbox_loss_w"][0, on] == 0).all()
         least = AUXILIARY / 0.60 / IDLE if name == "A" else 0.0
         assert table.fuel_kg[0, on].min() == pytest.approx(fuel_kgps(least, IDLE), rel=1e-9)
 

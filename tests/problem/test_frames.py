@@ -29,7 +29,7 @@ def test_a_trajectory_has_a_line_per_step_with_states_at_both_ends(problem_of):
     units = {"s", "m", "mps", "j", "kg", "w", "nm", "radps", "v", "a"}
     plain = {
         "gear", "clutch_open", "control", "mode", "engine_on", "engine_gear_chosen", "machine_gear", "level",
-        "soc_start", "soc_end", "machine_upstream", "machine_shared",
+        "soc_start", "soc_end",
     }  # fmt: skip
     assert {name for name in frame if name.rpartition("_")[2] not in units} == plain
 
@@ -67,4 +67,4 @@ def test_a_control_table_has_a_line_per_step_and_control_and_says_why_one_cannot
 def test_every_reason_of_a_rejected_control_is_in_words(problem_of):
     frame = problem_of("C2", "cadc_urban").table.to_frame()
     assert (frame["feasible"] == (frame["rejected"] == "")).all()
-    assert frame["rejected"].str.contains("machine torque or power, torque does not").any()
+    assert frame["rejected"].str.contains("engine torque, machine torque or power").any()

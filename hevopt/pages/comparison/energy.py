@@ -59,7 +59,7 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
             Item(name=STARTS, energy_j=starts_j),
             Item(name=CLUTCH, energy_j=total["clutch_loss_w"]),
             Item(name=GEARBOX, energy_j=total["gearbox_loss_w"]),
-            Item(name=MACHINE_GEAR, energy_j=total["machine_gear_loss_w"]),
+            Item(name=MACHINE_GEAR, energy_j=total["gear_loss_w"]),
             Item(name=MACHINE_LOSS, energy_j=total["machine_loss_w"]),
             Item(name=BATTERY_LOSS, energy_j=total["battery_loss_w"]),
             Item(
@@ -117,7 +117,7 @@ def _electric_links(add: Callable[[str, str, Array], None], trajectory: Trajecto
     add(DRAWN, AUXILIARIES, np.where(giving, auxiliary - covered, 0))
     add(DRAWN, MOTOR, np.where(motoring, electric, 0))
     # A motor at nearly no torque can take power from both sides; what the shaft gives is lost there as well.
-    dragged = np.maximum(-f["machine_torque_nm"] * f["machine_speed_radps"], 0)
+    dragged = np.maximum(-f["machine_power_w"], 0)
     add(MOTOR, MACHINE_LOSS, np.where(motoring, f["machine_loss_w"] - dragged, 0))
     add(GENERATOR, MACHINE_LOSS, np.where(motoring, 0, f["machine_loss_w"]))
     add(GENERATOR, AUXILIARIES, covered)
@@ -133,7 +133,7 @@ def _driveline_links(
     here: NDArray[np.bool_],
 ) -> None:
     """Links of the steps whose wheels drive, or brake."""
-    machine = f["machine_torque_nm"] * f["machine_speed_radps"]
+    machine = f["machine_power_w"]
     motoring = f["machine_electric_w"] > 0
     add(ENGINE, line, np.where(here, np.maximum(engine, 0), 0))
     add(line, DRAG, np.where(here, np.maximum(-engine, 0), 0))
@@ -142,5 +142,5 @@ def _driveline_links(
     add(line, GENERATOR, np.where(here & ~motoring, -machine, 0))
     add(line, CLUTCH, np.where(here, f["clutch_loss_w"], 0))
     add(line, GEARBOX, np.where(here, f["gearbox_loss_w"], 0))
-    add(line, MACHINE_GEAR, np.where(here, f["machine_gear_loss_w"], 0))
+    add(line, MACHINE_GEAR, np.where(here, f["gear_loss_w"], 0))
     add(line, BRAKES, np.where(here, f["brake_power_w"], 0))

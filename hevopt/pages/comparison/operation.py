@@ -36,7 +36,7 @@ def operations_of(trajectory: Trajectory, table: ControlTable) -> NDArray[np.int
     """
     f, power = trajectory.flows, trajectory.battery_power_w
     standing, braking = table.signals.speed_mps == 0, f["wheel_power_w"] < 0
-    machine = f["machine_torque_nm"] * f["machine_speed_radps"]
+    machine = f["machine_power_w"]
     tests = [
         standing & ~engine_on(trajectory, table),
         standing,

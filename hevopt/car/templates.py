@@ -1,0 +1,113 @@
+"""Drivelines by name: what the coupling of a short architecture file stands for, part by part.
+
+kind             also    parts
+none                     engine - clutch - gearbox - wheels; an alternator on the crankshaft, which follows the load
+belt             P0      the same, a machine on the crankshaft
+crankshaft       P1      the same
+gearbox_input    P2      the machine on the gearbox's input, the clutch between engine and machine
+gearbox_output   P3      the machine on the wheels, through a gear of its own and the final drive
+even_shaft               two gearboxes with a clutch each; the machine on the shaft of the even gears
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+from typing import Literal, NamedTuple
+
+from hevopt.car.driveline import Driveline
+from hevopt.car.machine import Machine
+from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox
+from hevopt.car.transmission import Gearbox as GearboxData
+
+CouplingKind = Literal[
+    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
+]
+_CRANK, _INPUT = "crankshaft", "gearbox input"
+
+
+class Options(NamedTuple):
+    """What a coupling's table may add to its kind."""
+
+    second_clutch: bool = False
+    machine_ratio: float = 1.0
+    machine_efficiency: float = 1.0
+    disconnects_above_speed_max: bool = False
+    machine_shift_fuel_kg: float = 0.0
+
+
+def crankshaft(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
+    """A, B, C1: the machine turns with the engine."""
+    parts = (Clutch("clutch", _CRANK, _INPUT, "driver"), _gearbox(gearbox))
+    placed = (("machine", _CRANK),)
+    return Driveline(kind, parts, _CRANK, placed, follows_load=kind == "none")
+
+
+def gearbox_input(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
+    """C2: the machine turns with the gearbox input; without the second clutch it cannot part from the engine."""
+    if not options.second_clutch:
+        return crankshaft(kind, options, gearbox, machine)
+    parts = (Clutch("clutch", _CRANK, _INPUT, "driver"), _gearbox(gearbox))
+    return Driveline(kind, parts, _CRANK, (("machine", _INPUT),))
+
+
+def gearbox_output(
+    kind: str, options: Options, gearbox: GearboxData, machine: Machine
+) -> Driveline:
+    """D: the machine turns with the wheels, through its own ratio and the final drive."""
+    parts = (
+        Clutch("clutch", _CRANK, _INPUT, "driver"),
+        _gearbox(gearbox),
+        Gear(
+            "machine gear",
+            "machine shaft",
+            WHEEL,
+            options.machine_ratio * float(gearbox.ratios[0]),
+            options.machine_efficiency,
+            machine.speed_max_radps if options.disconnects_above_speed_max else inf,
+        ),
+    )
+    return Driveline(kind, parts, _CRANK, (("machine", "machine shaft"),))
+
+
+def even_shaft(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
+    """E: the machine in each even gear; with the engine in an even gear both share that gear."""
+    numbers = range(1, len(gearbox.ratios))
+    even = tuple(gear for gear in numbers if gear % 2 == 0)
+    odd = tuple(gear for gear in numbers if gear % 2 == 1)
+    own = replace(_gearbox(gearbox), name="odd gears", first="odd shaft", gears=odd)
+    others = replace(
+        own,
+        name="even gears",
+        first="even shaft",
+        gears=even,
+        choice="preselected",
+        shift_fuel_kg=options.machine_shift_fuel_kg,
+    )
+    clutches = (
+        Clutch("odd clutch", _CRANK, own.first, "driver"),
+        Clutch("even clutch", _CRANK, others.first, "driver"),
+    )
+    return Driveline(kind, (*clutches, own, others), _CRANK, (("machine", others.first),))
+
+
+TEMPLATES: dict[CouplingKind, Callable[[str, Options, GearboxData, Machine], Driveline]] = {
+    "none": crankshaft,
+    "belt": crankshaft,
+    "crankshaft": crankshaft,
+    "gearbox_input": gearbox_input,
+    "gearbox_output": gearbox_output,
+    "even_shaft": even_shaft,
+}
+
+
+def _gearbox(data: GearboxData) -> Gearbox:
+    numbers = tuple(range(1, len(data.ratios)))
+    return Gearbox(
+        "gearbox",
+        _INPUT,
+        WHEEL,
+        tuple(map(float, data.ratios)),
+        tuple(map(float, data.efficiency)),
+        numbers,
+        "listed",
+    )

@@ -1,0 +1,140 @@
+"""Branches of a table: all controls of one state of the driveline, evaluated at every step."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.car.driveline import BRAKE, ENGINE, State
+from hevopt.driving.demand import Demand
+from hevopt.powertrain.levels import Around, labels, levels_of
+from hevopt.powertrain.operation import Setting, completed, flowing, setting
+from hevopt.powertrain.phases import Driver, driver_of, stretches
+from hevopt.powertrain.rejects import Bits, bits, function_rejects, limit_rejects
+from hevopt.problem.arrays import Array
+from hevopt.problem.battery import within_limits
+from hevopt.problem.table import Reject
+
+_ROUNDING_W = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """The steps at which a branch drives in one way, and the torques given there, (state, level) by actuator."""
+
+    here: Setting
+    given: Mapping[str, Array]
+
+
+class Driven(NamedTuple):
+    """A state, the names of its levels, and the pieces that make up its steps."""
+
+    state: State
+    labels: tuple[str, ...]
+    pieces: tuple[Piece, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Branch:
+    """All controls of one state; arrays (time, level)."""
+
+    driven: Driven
+    fuel_kg: Array
+    nox_kg: Array
+    battery_power_w: Array
+    reject: Bits
+
+
+def branches(car: Architecture, demand: Demand, levels: int, around: Around | None) -> list[Branch]:
+    """The branches of a car: engine turning first, with a free gear gear by gear."""
+    may_stop = bool(car.functions & {"start_stop", "power_management"}) or car.engine is None
+    found = []
+    for state, driver in _states(car, demand):
+        if state.engine_on or may_stop:
+            found.append(_branch(car, driver, state, levels, around))
+    return found
+
+
+def _states(car: Architecture, demand: Demand) -> list[tuple[State, Driver]]:
+    """The states of a car, each with the driver in the gear that it drives in."""
+    line = car.driveline
+    if car.gear == "cycle" or car.gearbox is None:
+        driver = driver_of(car, demand)
+        return [(state, driver) for state in line.states()]
+    found: list[tuple[State, Driver]] = []
+    for gear in range(1, len(car.gearbox.ratios)):
+        in_gear = driver_of(car, demand.with_gear(np.full_like(demand.gear, gear)))
+        found += [(state, in_gear) for state in line.states(gear) if state.engine_on]
+        needed = _needs_gear(car, in_gear)
+        if gear == 1 or needed:
+            states = line.states(gear if needed else 0)
+            found += [(state, in_gear) for state in states if not state.engine_on]
+    return found
+
+
+def _needs_gear(car: Architecture, driver: Driver) -> bool:
+    """Whether something turns with the gearbox's input while the engine rests."""
+    states = [state for state in car.driveline.states(1) if not state.engine_on]
+    ways = [stretch.way for state in states for stretch in stretches(car, driver, state)]
+    return any(use.gear is None for found in ways for use in found.uses)
+
+
+def _branch(
+    car: Architecture, driver: Driver, state: State, levels: int, around: Around | None
+) -> Branch:
+    named = labels(car.driveline.follows_load, state, levels, around)
+    demand = driver.demand
+    shape = len(demand.time_s), len(named)
+    fuel, nox, power = (np.zeros(shape) for _ in range(3))
+    reject = np.full(shape, int(Reject.NO_PATH), dtype=np.uint16)
+    pieces = []
+    for stretch in stretches(car, driver, state):
+        here = setting(car, stretch.way, stretch.shafts)
+        chosen = levels_of(here, state, levels, around)
+        torques, step = completed(here, chosen.given), stretch.step
+        flows, step_s = flowing(here, torques), demand.step_s[step][:, None]
+        battery = flows.machines_w + car.vehicle.auxiliary_power_w
+        # What an alternator that follows its load leaves to the battery is rounding, not charge.
+        battery = np.where(np.abs(battery) < _ROUNDING_W, 0.0, battery)
+        fuel[step] = flows.fuel_kgps * step_s
+        nox[step] = flows.nox_kgps * step_s
+        power[step] = battery
+        reject[step] = (
+            bits(Reject.ENGINE_MAP, flows.off_engine_map)
+            | bits(Reject.MACHINE_MAP, flows.off_machine_map)
+            | limit_rejects(here, torques)
+            | function_rejects(here, state, torques, battery)
+            | bits(Reject.DUPLICATE, chosen.repeats)
+        )
+        pieces.append(Piece(here, chosen.given))
+    reject |= bits(Reject.BATTERY_LIMIT, ~within_limits(car.battery, power))
+    return Branch(Driven(state, named, tuple(pieces)), fuel, nox, power, reject)
+
+
+def deliverable_nm(car: Architecture, branch: Branch, steps: int) -> Array:
+    """(time,) largest wheel torque of a branch: machines at their limit, engine at full load or its map's end."""
+    result = np.zeros(steps)
+    for piece in branch.driven.pieces:
+        here = piece.here
+        if here.way.slack is not None:
+            names = {*here.way.chosen, here.way.slack}
+            given = {name: _most_nm(here, name)[:, None] for name in names}
+            if car.driveline.follows_load:
+                given |= piece.given
+            short = here.torques.solve(given, [BRAKE])[BRAKE][:, 0]
+            result[here.shafts.step] = here.shafts.wheel_nm - short
+    return result
+
+
+def _most_nm(here: Setting, name: str) -> Array:
+    """(state,) highest torque of an actuator; of an engine that cannot be used, that of its own inertia."""
+    if name != ENGINE:
+        motoring = here.car.functions & {"e_boost", "nox_cut", "power_management"}
+        return here.limit_nm(name) if motoring else np.zeros(len(here.shafts.step))
+    engine, speed = here.car.engine, here.engine_radps
+    most = engine.covered_nm(speed)
+    shaft = here.way.active[ENGINE]
+    unused = engine.inertia_kgm2 * here.shafts.accel_radps2[shaft]
+    return np.where(np.isnan(most) | (speed > engine.speed_max_radps), unused, most)

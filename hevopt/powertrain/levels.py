@@ -1,0 +1,124 @@
+"""Which torques are open at each step, and the levels of them that a table holds.
+
+One torque is chosen: a machine's, what the engine's limits and its own leave open, the engine delivering the rest;
+or without an engine that acts, from what meets the demand to none, friction brakes taking the rest while the car
+brakes. Always among the levels of a turning engine: both ends (engine at full load and at its lowest torque), zero
+torque, battery idle, engine at its best efficiency, and fuel cut without friction brakes.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hevopt.car.driveline import ENGINE, State
+from hevopt.powertrain.operation import Setting
+from hevopt.problem.arrays import Array, Flags, Indices
+
+_BRAKING_LEVELS = 6
+_TORQUE_TOLERANCE_NM = 1e-6
+_ADDED_PLACES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+_SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency", "fuel cut")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Around:
+    """Where to add torques: close to those of a plan.
+
+    torque_nm: state -> (time,) torque of the plan, NaN where it drives in another state
+    share: distance of the outermost torque added, as a share of what is open at the step
+    """
+
+    torque_nm: Mapping[State, Array]
+    share: float
+
+    def added_nm(self, state: State, step: Indices, low: Array, high: Array) -> Array:
+        """(state, added) torques; the lowest open one again where the plan drives in another state."""
+        known = self.torque_nm.get(state)
+        centre = (np.full(low.shape, np.nan) if known is None else known[step])[:, None]
+        added = centre + self.share * (high - low)[:, None] * _ADDED_PLACES
+        low, high = np.minimum(low, high)[:, None], np.maximum(low, high)[:, None]
+        return np.where(np.isnan(added), low, np.clip(added, low, high))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Levels:
+    """Torques given, (state, level) by actuator; repeats: levels that are there already, (state, level)."""
+
+    given: Mapping[str, Array]
+    repeats: Flags
+
+
+def labels(follows_load: bool, state: State, levels: int, around: Around | None) -> tuple[str, ...]:
+    """The names of a state's levels."""
+    if follows_load:
+        return ("battery idle",)
+    shares = _shares(state, levels)
+    named = tuple(f"{share:.3f}" for share in shares)
+    if not state.engine_on:
+        return named
+    added = () if around is None else tuple(f"refined {place:+.2f}" for place in _ADDED_PLACES)
+    return (*named, *_SPECIAL_LEVELS, *added)
+
+
+def levels_of(here: Setting, state: State, levels: int, around: Around | None) -> Levels:
+    """The levels of a way of a state, as many as `labels` names."""
+    count = len(labels(here.car.driveline.follows_load, state, levels, around))
+    name = here.way.chosen[0] if here.way.chosen else here.way.slack
+    if name is None or name == ENGINE:
+        return _single(len(here.shafts.step), count)
+    if here.car.driveline.follows_load:
+        torque = _idle_nm(here, name)[:, None]
+        return Levels({name: torque}, np.zeros(torque.shape, dtype=bool))
+    low, high, best, cut = _open_nm(here, name)
+    shares = _shares(state, levels)
+    torque = low[:, None] * (1 - shares) + high[:, None] * shares
+    repeats = np.zeros((len(low), count), dtype=bool)
+    if state.engine_on:
+        idle = _idle_nm(here, name)
+        if not here.way.chosen:
+            repeats[:, len(shares) + _SPECIAL_LEVELS.index("best efficiency")] = True
+        torque = np.column_stack([torque, np.zeros_like(idle), idle, best, cut])
+        if around is not None:
+            added = around.added_nm(state, here.shafts.step, low, high)
+            torque = np.column_stack([torque, added])
+    repeats[high - low <= _TORQUE_TOLERANCE_NM, 1:] = True
+    return Levels({name: torque}, repeats)
+
+
+def _shares(state: State, levels: int) -> Array:
+    return np.linspace(0.0, 1.0, levels if state.engine_on else _BRAKING_LEVELS)
+
+
+def _single(states: int, count: int) -> Levels:
+    repeats = np.ones((states, count), dtype=bool)
+    repeats[:, 0] = False
+    return Levels({}, repeats)
+
+
+def _idle_nm(here: Setting, name: str) -> Array:
+    """(state,) torque at which a machine supplies the electric load and no more; 0 where it cannot."""
+    load = here.car.vehicle.auxiliary_power_w
+    return np.nan_to_num(here.machines[name].generating_nm(load, here.speed_radps(name)))
+
+
+def _open_nm(here: Setting, name: str) -> tuple[Array, Array, Array, Array]:
+    """(state,) lowest and highest torque that the limits of engine and machine leave open, and between them that
+    of the engine's best efficiency and that of its lowest torque; both the lowest where no engine acts."""
+    limit, wanted = here.limit_nm(name), here.shafts.wheel_nm
+    if name in here.way.chosen:
+        engine, speed = here.car.engine, here.engine_radps
+        full = engine.covered_nm(speed)
+        full = np.where(np.isnan(full), np.maximum(here.least_nm, 0.0), full)
+        wished = np.column_stack([full, here.least_nm, engine.best_nm(speed)])
+        pinned = here.torques.solve(here.unbraked({ENGINE: wished}), [name])[name]
+        low, high, best = np.broadcast_to(pinned, wished.shape).T
+    else:
+        found = here.torques.solve(here.unbraked({}), [name])[name]
+        low = high = best = np.broadcast_to(found, (len(limit), 1))[:, 0]
+    cut = high
+    high = np.where(wanted > 0, high, np.maximum(high, 0.0))
+    low, high = np.clip(low, -limit, limit), np.clip(high, -limit, limit)
+    if name in here.way.chosen:
+        return low, high, best, np.clip(cut, np.minimum(low, high), np.maximum(low, high))
+    return low, high, low, low
