@@ -32,6 +32,8 @@ _HOME = {
     "Certificate": "hevopt.bounds.certificate",
     "compare": "hevopt.studies.comparison",
     "Comparison": "hevopt.studies.comparison",
+    "compare_and_report": "hevopt.pages.comparison.compared",
+    "report": "hevopt.pages.report",
     "read_saved": "hevopt.pages.comparison.frames",
     "read_saved_steps": "hevopt.pages.comparison.frames",
     "sweep": "hevopt.sweeps.sweep",

@@ -5,8 +5,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hevopt.commands.reporting import command_line, write_files
-from hevopt.commands.terminal import show, write
+from hevopt.commands.reporting import command_line
+from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
@@ -65,19 +65,6 @@ class Job:
         from hevopt.reproduction.published import is_study
 
         return is_study(self.cars.cars, self.trace)
-
-    def changed(self) -> list[str]:
-        """Lines that say what was changed in the cars, and what was left out."""
-        said: dict[str, list[str]] = {}
-        for car, changes in self.cars.changes.items():
-            for key, value in changes.items():
-                said.setdefault(f"{key} = {value}", []).append(car)
-        every = len(self.cars.changes)
-        lines = [
-            f"set: {change}" + ("" if len(names) == every else f" in {', '.join(names)}")
-            for change, names in said.items()
-        ]
-        return lines + self.cars.left_out
 
 
 @dataclass
@@ -157,18 +144,18 @@ class Files:
     ) -> tuple[list[str], dict[str, HevoptError]]:
         if self._collector is None:
             return [], {}
-        from hevopt.commands.studies import with_studies
+        from hevopt.pages.comparison.compared import Extras, with_studies, write_files
 
         results = self._collector.results(
             comparison,
             command_line(),
-            changes=job.changed(),
+            changes=job.cars.said(),
             others=job.others,
             published=job.is_study,
         )
-        results, failures = with_studies(
-            results, job.cars, job.trace, job.settings, fronts=self.fronts, effects=self.effects
-        )
+        extras = Extras(job.cars, job.trace, job.settings, self.fronts, self.effects)
+        with Progress() as progress:
+            results, failures = with_studies(results, extras, progress)
         return write_files(results, self.page, self.save), failures
 
 
@@ -181,7 +168,7 @@ def show_comparison(job: Job, comparison: "Comparison", *, json: bool) -> None:
         write(outputs.result_json(comparison, job.about))
         return
     show(report.comparison_table(comparison))
-    write("\n".join([report.comparison_notes(comparison), *job.changed()]) + "\n")
+    write("\n".join([report.comparison_notes(comparison), *job.cars.said()]) + "\n")
     published = report.published_table(comparison) if job.is_study else None
     if published is not None:
         show(published)

@@ -149,7 +149,7 @@ def run(
         write(outputs.result_json(comparison, job.about))
         return
     show(report.comparison_table(comparison))
-    write("\n".join([report.comparison_notes(comparison), *job.changed()]))
+    write("\n".join([report.comparison_notes(comparison), *job.cars.said()]))
     calibration = report.calibration_table(plan)
     if calibration is not None:
         show(calibration)

@@ -1,7 +1,6 @@
 """`hevopt pareto`, `sensitivity` and `reproduction`: many problems solved for one answer."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,13 +14,11 @@ from hevopt.commands.options import (
     takes_settings,
 )
 from hevopt.commands.terminal import Progress, show, write
-from hevopt.errors import DataError, HevoptError
+from hevopt.errors import DataError
 
 if TYPE_CHECKING:
     from hevopt.driving.cycle import Cycle
-    from hevopt.pages.comparison.results import Results
     from hevopt.studies.cars import Cars
-    from hevopt.studies.settings import Settings
 
 _OPTIONS = "the command line"
 
@@ -129,47 +126,6 @@ def reproduction(
         found = reproduce(progress)
     write_whole(out, page(found).encode())
     write(f"written to {out}")
-
-
-def with_studies(
-    results: "Results",
-    cars: "Cars",
-    trace: "Cycle",
-    settings: "Settings",
-    *,
-    fronts: bool,
-    effects: bool,
-) -> tuple["Results", dict[str, HevoptError]]:
-    """The results of a comparison with the fronts and sensitivities of its cars, where asked for; what failed.
-
-    A car whose front or sensitivities cannot be had is a failure, and costs no other result.
-    """
-    from hevopt.pages.comparison.results import ParetoFront, Sensitivity
-    from hevopt.studies.fronts import front_of
-    from hevopt.studies.sensitivity import effects_on
-
-    wanted = [car for car in cars.cars if car.name in results.cars]
-    settings = replace(settings, horizon_s=None)  # of dp and the rules, which look at no preview
-    added: dict[str, list[Any]] = {"pareto": [], "sensitivity": []}
-    failures: dict[str, HevoptError] = {}
-    with Progress() as progress:
-        for car in wanted if fronts else ():
-            try:
-                front = front_of(car, trace, settings, progress=progress)
-                added["pareto"].append(ParetoFront.model_validate(front.as_dict()))
-            except HevoptError as error:
-                failures[f"{car.name} front"] = error
-        for car in wanted if effects else ():
-            try:
-                changes = cars.changes[car.name]
-                found = effects_on(car, changes, trace, settings, progress=progress)
-                added["sensitivity"] += [Sensitivity.model_validate(e.as_dict()) for e in found]
-            except HevoptError as error:
-                failures[f"{car.name} sensitivity"] = error
-    said = results.failures | {name: str(error) for name, error in failures.items()}
-    asked = {"pareto": fronts, "sensitivity": effects}
-    update = {name: lines for name, lines in added.items() if asked[name]}
-    return results.model_copy(update=update | {"failures": said}), failures
 
 
 def _numbers(option: str, text: str) -> list[float]:

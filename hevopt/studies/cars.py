@@ -21,6 +21,19 @@ class Cars:
     changes: dict[str, dict[str, Any]]
     left_out: list[str]
 
+    def said(self) -> list[str]:
+        """Lines that say what was changed in the cars, and what was left out."""
+        told: dict[str, list[str]] = {}
+        for car, changes in self.changes.items():
+            for key, value in changes.items():
+                told.setdefault(f"{key} = {value}", []).append(car)
+        every = len(self.changes)
+        lines = [
+            f"set: {change}" + ("" if len(names) == every else f" in {', '.join(names)}")
+            for change, names in told.items()
+        ]
+        return lines + self.left_out
+
 
 def cars_of(wanted: Iterable[Architecture | str | Path] | None, settings: Settings) -> Cars:
     """The architectures, by default the shipped ones, with the settings made in those that are read here.

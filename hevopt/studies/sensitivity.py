@@ -16,7 +16,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle, load_cycle
-from hevopt.errors import HevoptError
+from hevopt.errors import DataError, HevoptError
 from hevopt.strategies import Strategy, chosen, fitting, strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
@@ -101,6 +101,11 @@ def effects_on(
 ) -> list[Effect]:
     """The effects on a car, see `sensitivities`. made: key path -> value of what was changed when it was read."""
     base = {**made, **({"gear": "free"} if car.gear == "free" else {})}
+    if load_architecture(car.source, base).contents != car.contents:
+        raise DataError(
+            f"{car.name} is not what {car.source} holds: sensitivities are of a car as its file has it; give its "
+            "name or file, and the changes beside"
+        )
     names = list(strategies or _usual(car.functions))
     for name in names:
         strategy_named(name, others)

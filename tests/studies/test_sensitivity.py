@@ -133,7 +133,7 @@ def test_what_a_car_lacks_costs_the_comparison_nothing(hevopt, monkeypatch):
     def no_front(*_, **__):
         raise SolverError("no front")
 
-    monkeypatch.setattr("hevopt.studies.sensitivity.effects_on", failing)
+    monkeypatch.setattr("hevopt.pages.comparison.compared.effects_on", failing)
     monkeypatch.setattr("hevopt.studies.fronts.front", no_front)
     words = ("--sensitivity", "--fronts", "--save", "saved.gz", "--out", "rows.csv")
     status, out, err = hevopt("compare", "--architectures", "A,B", "--strategies", "dp", *words)

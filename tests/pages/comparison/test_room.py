@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from hevopt.commands.reporting import write_files
 from hevopt.errors import DataError
 from hevopt.pages.comparison import room
 from hevopt.pages.comparison.collect import STEPS_MAX
+from hevopt.pages.comparison.compared import write_files
 from hevopt.pages.comparison.saved import load_results
 
 
