@@ -34,6 +34,7 @@ def _rest_of(problem: Problem, step: int, soc: float, mode: int) -> Problem:
     kept = ControlTable.from_arrays(
         table.fuel_kg[step:], table.battery_power_w[step:], table.feasible[step:], step_s=table.step_s[step:],
         mode=table.mode, switch_fuel_kg=table.switch_fuel_kg, switch_allowed=table.switch_allowed,
+        switch_energy_j=table.switch_energy_j,
     )  # fmt: skip
     return Problem(kept, problem.battery, soc, problem.soc_end_min, start_mode=mode)
 
@@ -121,10 +122,10 @@ def factor() -> Figure:
     factors = np.linspace(0.97, 1.03, 121) * one_price_dual(problem)[-1].price_kgpj
     gained = []
     for each in factors:
+        priced_kg = choices.cost_kg + each * drain_j
         _, path, _ = shortest_path(
-            choices.first, choices.cost_kg + each * drain_j, choices.switch_kg, choices.switch_allowed,
-            problem.start_mode,
-        )  # fmt: skip
+            choices, priced_kg, np.full(choices.steps, each), problem.start_mode
+        )
         gained.append(-float(drain_j[path].sum()) / 3.6e6)
     figure, (axes,) = _axes()
     axes.plot(factors * 3.6e9, gained, ".-", color=_BLUE, lw=0.8, ms=4)

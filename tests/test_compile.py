@@ -17,7 +17,7 @@ from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual
 from hevopt.problem.choices import choices_of
-from hevopt.strategies import _rollout_kernels, dp
+from hevopt.strategies import _backward_kernels, _rollout_kernels, dp
 
 TWICE = """
 from hevopt._compile import compiled
@@ -137,8 +137,10 @@ def figures() -> str:
         choices, low_high = choices_of(problem), np.array(problem.window_j)
         terminal = np.tile(np.linspace(1e-3, 0.0, 31), (choices.modes, 1))
         grid = _rollout_kernels.Grid(np.full(choices.steps + 1, low_high[0]), np.ptp(low_high) / 30)
-        penalty = _rollout_kernels.Penalty(1e-4, 0.0, 1.0)
-        value = _rollout_kernels.backward(choices, terminal, grid, penalty, problem.battery.arrays)
+        penalty = _backward_kernels.Penalty(1e-4, 0.0, 1.0)
+        value = _backward_kernels.backward(
+            choices, terminal, grid, grid.low_j[:-1], penalty, problem.battery.arrays
+        )
         found += [rollout.cost_kg, rollout.end_j, *bounds, *value[0].flat]
     return " ".join(float(figure).hex() for figure in found)
 

@@ -9,6 +9,7 @@ from hevopt.bounds._step_prices_kernels import WindowCells
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, drain_and_slope
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices
+from hevopt.problem.switching import Switching
 
 
 class PartedGrid(NamedTuple):
@@ -21,11 +22,15 @@ class PartedGrid(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """Upper bounds of the choices' moves, in cells: offset + rise x node, (entry, piece) each."""
+    """Upper bounds of the choices' moves, in cells: offset + rise x node, (entry, piece) each.
+
+    switch: (case, mode, mode) whole cells that switching takes, or fewer
+    """
 
     breaks: Indices
     offset: Array
     rise: Array
+    switch: Indices
 
 
 class Relaxation(NamedTuple):
@@ -116,12 +121,39 @@ def _run_end(low: int, high: int, start: float, rise: float, whole: int) -> int:
 
 
 @compiled()
+def _switch_back(
+    value: Array,
+    best: Array,
+    switching: Switching,
+    cells: Indices,
+    k: int,
+    relaxation: Relaxation,
+) -> None:
+    """Fill the value (mode, node) before switching from that between switching and step k."""
+    case, modes, nodes = switching.case[k], value.shape[0], value.shape[1]
+    for m in range(modes):
+        value[m] = relaxation.unreachable_kg
+        for n in range(modes):
+            if not switching.allowed[case, m, n]:
+                continue
+            kg, down = switching.kg[case, m, n], cells[case, m, n]
+            bottom, top = min(max(down, 0), nodes), max(min(nodes + down, nodes), 0)
+            for j in range(bottom):
+                below_kg = relaxation.floor_kg * (down - j)
+                value[m, j] = min(value[m, j], kg + best[n, 0] + below_kg)
+            for j in range(bottom, top):
+                value[m, j] = min(value[m, j], kg + best[n, j - down])
+            for j in range(top, nodes):
+                value[m, j] = min(value[m, j], kg + best[n, nodes - 1])
+
+
+@compiled()
 def lower_backward(
     choices: Choices, terminal: Array, moves: Moves, relaxation: Relaxation
 ) -> Array:
     """(mode, node) lower bound of the cost-to-go before the first step; terminal: the same after the last."""
     first, cost = choices.first, choices.cost_kg
-    breaks, offset, rise = moves
+    breaks, offset, rise, switch = moves
     floor_kg, unreachable_kg = relaxation
     steps, modes, nodes = first.shape[0], first.shape[1] - 1, terminal.shape[1]
     pieces = len(breaks) - 1
@@ -181,10 +213,5 @@ def lower_backward(
                 padded[n, pad + j] = least
         for n in range(modes):
             best[n] = padded[n, pad : pad + nodes]
-        for m in range(modes):
-            value[m] = unreachable_kg
-            for n in range(modes):
-                if choices.switch_allowed[m, n]:
-                    for j in range(nodes):
-                        value[m, j] = min(value[m, j], choices.switch_kg[m, n] + best[n, j])
+        _switch_back(value, best, choices.switching, switch, k, relaxation)
     return value

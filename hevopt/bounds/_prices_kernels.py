@@ -3,8 +3,9 @@
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices
+from hevopt.problem.switching import Switching
 
 
 @compiled()
@@ -23,17 +24,23 @@ def block_minima(first: Indices, value: Array) -> tuple[Array, Indices]:
 
 
 @compiled()
-def mode_path(least: Array, switch_kg: Array, allowed: Flags) -> tuple[Array, Indices]:
-    """Cost-to-go (time + 1, mode) and best next mode (time, mode) of (time, mode) least values."""
+def mode_path(least: Array, switching: Switching, price: Array) -> tuple[Array, Indices]:
+    """Cost-to-go (time + 1, mode) and best next mode (time, mode) of (time, mode) least values.
+
+    price: (time,) of the stored energy that switching takes before each step
+    """
+    case, switch_kg, switch_j, allowed = switching
     steps, modes = least.shape
     to_go = np.zeros((steps + 1, modes))
     follow = np.zeros((steps, modes), dtype=np.int64)
     for k in range(steps - 1, -1, -1):
+        c = case[k]
         for m in range(modes):
             best = np.inf
             for n in range(modes):
-                if allowed[m, n]:
-                    total = switch_kg[m, n] + least[k, n] + to_go[k + 1, n]
+                if allowed[c, m, n]:
+                    taken_kg = switch_kg[c, m, n] + price[k] * switch_j[c, m, n]
+                    total = taken_kg + least[k, n] + to_go[k + 1, n]
                     if total < best:
                         best = total
                         follow[k, m] = n
@@ -42,10 +49,15 @@ def mode_path(least: Array, switch_kg: Array, allowed: Flags) -> tuple[Array, In
 
 
 @compiled()
-def shortest_path(choices: Choices, value: Array, start_mode: int) -> tuple[float, Indices, Array]:
-    """Least total of (entry,) values and switching, its (time,) entries, cost-to-go (time + 1, mode)."""
+def shortest_path(
+    choices: Choices, value: Array, price: Array, start_mode: int
+) -> tuple[float, Indices, Array]:
+    """Least total of (entry,) values and switching, its (time,) entries, cost-to-go (time + 1, mode).
+
+    price: (time,) of the stored energy that switching takes before each step
+    """
     least, entry = block_minima(choices.first, value)
-    to_go, follow = mode_path(least, choices.switch_kg, choices.switch_allowed)
+    to_go, follow = mode_path(least, choices.switching, price)
     path = np.zeros(len(least), dtype=np.int64)
     if np.isfinite(to_go[0, start_mode]):
         mode = start_mode

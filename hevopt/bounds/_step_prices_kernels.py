@@ -12,7 +12,7 @@ from hevopt.problem._battery_kernels import (
     drain_and_slope,
 )
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.choices import Choices
+from hevopt.problem.choices import Choices, State
 
 # A step's price is at most this multiple of the next one's; any prices are valid.
 _GROWTH_MAX = 10.0
@@ -45,13 +45,19 @@ def costate(energy: Array, power: Array, step_s: Array, battery: BatteryArrays) 
 
 @compiled()
 def _worth_with_first_step(
-    choices: Choices, price: Array, start: float, battery: BatteryArrays
+    choices: Choices, price: Array, start: State, battery: BatteryArrays
 ) -> Array:
-    """(entry,) with the first step's entries filled: there x is the start's, and has no price of its own."""
+    """(entry,) with the first step's entries filled: there x is the start's less what switching takes, and has no
+    price of its own."""
     first, power = choices.first, choices.power_w
     worth = np.empty(len(power))
-    for i in range(first[0, 0], first[0, -1]):
-        worth[i] = price[0] * choices.step_s[0] * chemical_power_at(power[i], start, battery)
+    low, high, case = battery.energy_j[0], battery.energy_j[-1], choices.switching.case[0]
+    for n in range(first.shape[1] - 1):
+        # Within the window, which no plan leaves.
+        x = start.energy_j - choices.switching.energy_j[case, start.mode, n]
+        x = min(max(x, low), high)
+        for i in range(first[0, n], first[0, n + 1]):
+            worth[i] = price[0] * choices.step_s[0] * chemical_power_at(power[i], x, battery)
     return worth
 
 
@@ -59,7 +65,7 @@ def _worth_with_first_step(
 def worth_by_tangents(
     choices: Choices,
     price: Array,
-    start: float,
+    start: State,
     rollout: Array,
     steep: Flags,
     window: tuple[float, float],
@@ -67,7 +73,7 @@ def worth_by_tangents(
 ) -> Array:
     """(entry,) least of  p_t+1 r_t(x) + (p_t - p_t+1) x  over the window, from below, r convex and falling in x.
 
-    rollout: (time + 1,) where a tangent touches beside those at the window's ends
+    rollout: (time,) where a tangent touches beside those at the window's ends
     steep: (entry,) whether r is too steep somewhere for a tangent; then r is at least its value at the upper end
     """
     first, power, step_s = choices.first, choices.power_w, choices.step_s
@@ -111,7 +117,7 @@ def _meeting(x1: float, y1: float, s1: float, x2: float, y2: float, s2: float) -
 
 @compiled()
 def worth_by_cells(
-    choices: Choices, price: Array, start: float, cells: WindowCells, battery: BatteryArrays
+    choices: Choices, price: Array, start: State, cells: WindowCells, battery: BatteryArrays
 ) -> Array:
     """As worth_by_tangents, for any curves: the least over cells, r from below within each."""
     first, power, step_s = choices.first, choices.power_w, choices.step_s

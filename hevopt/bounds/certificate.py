@@ -20,8 +20,9 @@ from math import inf
 
 import numpy as np
 
+from hevopt.bounds.lines import Line
 from hevopt.bounds.lower_dp import lower_bound_kg
-from hevopt.bounds.prices import EPSILON, Line, end_slack_j, one_price_dual
+from hevopt.bounds.prices import EPSILON, end_slack_j, one_price_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.display.facts import Shown
 from hevopt.errors import SolverError

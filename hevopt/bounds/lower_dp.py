@@ -17,8 +17,10 @@ grid can be computed that is non-increasing and below  min over u of f_u + V(x +
    and lowering node i by the larger of delta_i-1 and delta_i puts the line below every h_u.
 4. Order. Taking at each node the least of itself and the nodes to its left only lowers W, and makes it
    non-increasing. The true cost-to-go does not increase either, as charge may be thrown away.
-5. Modes. The least over modes of switching cost + W is concave in each cell wherever modes cross, so the line
-   between its nodes is below it: no further correction.
+5. Modes. Switching takes fuel K and stored energy s first: the value before it is the least over modes of
+   K + W(x - s). With s rounded down to whole cells the argument grows, so W falls or stays: a function below the
+   true one, piecewise linear on the same grid. The least over modes is concave in each cell wherever modes cross,
+   so the line between its nodes is below it: no further correction.
 6. Moves are taken upward, by what rounding may have done to them and to a plan's own trace, so that 1 to 3 hold as
    computed; no move need be greater than the grid, whose top is as good as anything above it, nor less than the
    grid downward, for a greater one proves less. What is left is rounding of values, some ten operations of each
@@ -38,7 +40,7 @@ import numpy as np
 from hevopt.bounds import _lower_dp_kernels as kernels
 from hevopt.bounds.prices import EPSILON, bounded_choices, drain_magnitude_w, end_slack_j
 from hevopt.bounds.step_prices import line_above, steep, window_cells
-from hevopt.problem.arrays import Array
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, without_dominated
 from hevopt.problem.problem import Problem
 
@@ -103,10 +105,20 @@ def _move_bounds(problem: Problem, choices: Choices, grid: Array, cell: float) -
     furthest = offset + rise * breaks[1:]
     # A piece without a move, of a cell that the window does not touch, stays without.
     offset = np.where(far & np.isfinite(offset), np.clip(furthest, -nodes, nodes), offset)
-    return kernels.Moves(breaks, offset, np.where(far, 0.0, rise))
+    return kernels.Moves(
+        breaks, offset, np.where(far, 0.0, rise), _switch_cells(choices, grid, cell)
+    )
+
+
+def _switch_cells(choices: Choices, grid: Array, cell: float) -> Indices:
+    """(case, mode, mode) cells that switching takes at least, rounding and that of a plan's own trace taken off."""
+    energy_j = choices.switching.energy_j
+    spared_j = 4.0 * EPSILON * (np.abs(energy_j) + np.abs(grid).max())
+    cells = np.floor((energy_j - np.where(energy_j == 0.0, 0.0, spared_j)) / cell)
+    return np.clip(cells, -len(grid), 4 * len(grid)).astype(np.int64)
 
 
 def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:
     """What a node counts from which no path is known: any figure is a bound there, one above all paths the best."""
-    worst_step = float(np.abs(choices.cost_kg).max(initial=0.0)) + float(choices.switch_kg.max())
+    worst_step = float(np.abs(choices.cost_kg).max(initial=0.0)) + float(choices.switching.kg.max())
     return worst_step * choices.steps + 2.0 * float(terminal_kg.max())

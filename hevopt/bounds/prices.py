@@ -1,10 +1,11 @@
 """Paths under prices: with a price on stored energy the steps come apart, up to the switching costs.
 
 For a multiplier p >= 0 (kg per J) on the end-charge constraint, and r_t(u) the fall of stored energy,
-    g(p) = min over mode paths and controls of  sum [cost_t(u) + p r_t(u) + switching] + p (x_end - x_start)
-is a lower bound on the cost of every feasible plan (weak duality): on such a plan the sum of r_t is at most
-x_start - x_end. The minimum is exact, a shortest path over modes (Viterbi). g is concave and piecewise linear;
-`maximise` finds its top by intersecting supporting lines.
+    g(p) = min over mode paths and controls of  sum [cost_t(u) + p r_t(u) + K + p s] + p (x_end - x_start)
+is a lower bound on the cost of every feasible plan (weak duality): with K and s, the fuel and the stored energy
+that switching takes, the sum of r_t + s_t on such a plan is at most x_start - x_end. The minimum is exact, a
+shortest path over modes (Viterbi). g is concave and piecewise linear; lines.py finds its top by intersecting
+supporting lines.
 
 Where r_t depends on the state of charge, its least value within the window takes its place: still a bound.
 
@@ -14,21 +15,22 @@ hold is  computed g - allowance <= cost as computed of a plan that simulate acce
    most 2 T u times the sum of their magnitudes. Where costs are >= 0 that is the sum itself, and for any sign the
    sum and twice all that may be negative: |g| + 2 N + 2 S W, N the greatest falls of cost below 0 per step, summed.
    (A plan that costs more than twice |g| needs no allowance.) The cost as simulate adds it is off by less.
-2. W holds the magnitudes of what is priced, step by step: p dt r with |r| <= 2 |P|, (p_t - p_t+1) x, and at the
-   ends p x. r is computed to 4 u and the root's share: an error of Uoc² grows by U / sqrt(U² - 4 R P) at most
-   (`amplification`). A tangent's slope times the window is off by at most its third power, times the voltage's
-   rise over the window. `priced_magnitude` takes both; the prices' own scaling and the sums add a few u more.
-3. The plan's trace is rounded at each step, by at most 2 u x_max and the error of r: sum over t of p_t+1 x_max.
+2. W holds the magnitudes of what is priced, step by step: p dt r with |r| <= 2 |P|, (p_t - p_t+1) x, p s, one more
+   term that is added to K first, and at the ends p x. r is computed to 4 u and the root's share: an error of Uoc²
+   grows by U / sqrt(U² - 4 R P) at most (`amplification`). A tangent's slope times the window is off by at most
+   its third power, times the voltage's rise over the window. `drain_magnitude_w` takes both; the prices' own
+   scaling and the sums add a few u more.
+3. The plan's trace is rounded at each step, by at most 3 u x_max and the error of r: sum over t of p_t+1 x_max.
 4. Products below the smallest normal number are off by more, all together by less than it: it is taken off, too.
 Together  epsilon [(2 T + 48) (|g| + 2 N + 4 S W) + 8 S sum p x_max],  about 1e-10 of the cost on shipped cycles.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds.lines import Line, maximise
 from hevopt.errors import InfeasibleError
 from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
@@ -37,30 +39,13 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, kept
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Problem
+from hevopt.problem.switching import Switched, switched
 
 EPSILON, TINY = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
-_LINES_MAX = 200
-_QUADRUPLINGS_MAX = 16
 # A move this share beyond the window is beyond it, whatever rounding did to it.
 _WELL_BEYOND = 1e-6
-# Two lines meet within rounding of the best value known: the top is found.
-_RELATIVE_TOLERANCE = 1e-13
 # Beyond this amplification a tangent's slope is not computed well enough to be of use.
 STEEPEST = 1e3
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A supporting line of a dual, and a bound for every end charge.
-
-    scale, value_kg, slope_kg: where it touches, the bound there less its rounding, its derivative by the scale
-    price_kgpj: price at the end, which is what a joule more of end charge adds to the bound
-    """
-
-    scale: float
-    value_kg: float
-    slope_kg: float
-    price_kgpj: float
 
 
 def end_slack_j(problem: Problem) -> float:
@@ -112,7 +97,18 @@ def one_price_dual(problem: Problem) -> list[Line]:
     choices = bounded_choices(problem)
     worth = least_drain_j(problem, choices)
     rounding = priced_rounding(problem, choices, np.ones(choices.steps), tangents=False)
-    return dual(problem, choices, worth, problem.end_min_j - problem.start_j, 1.0, rounding)
+    priced = Priced(
+        worth, np.ones(choices.steps), problem.end_min_j - problem.start_j, 1.0, rounding
+    )
+    return dual(problem, choices, priced)
+
+
+def before_steps(price: Array) -> Array:
+    """(time,) prices of stored energy before each step, p_1 p_1 p_2 ... p_T-1, of those after it, p_1 ... p_T.
+
+    Before the first step stored energy is not free: all that counts is what it is after it.
+    """
+    return np.concatenate([price[:1], price[:-1]])
 
 
 def priced_rounding(problem: Problem, choices: Choices, price: Array, *, tangents: bool) -> float:
@@ -122,9 +118,10 @@ def priced_rounding(problem: Problem, choices: Choices, price: Array, *, tangent
     priced = (
         price * choices.step_s * step_maxima(choices, drain_magnitude_w(choices, inside, tangents))
     )
+    switch_j = before_steps(price) * _greatest_switch_j(choices)
     tilt = np.abs(np.diff(price))
     ends = price[-1] * abs(problem.end_min_j) + price[0] * abs(problem.start_j)
-    magnitude = float(np.sum(priced) + np.sum(tilt) * stored_j + ends)
+    magnitude = float(np.sum(priced) + np.sum(switch_j) + np.sum(tilt) * stored_j + ends)
     return EPSILON * (
         4.0 * (2 * choices.steps + 48) * magnitude + 8.0 * float(np.sum(price)) * stored_j
     )
@@ -138,6 +135,13 @@ def drain_magnitude_w(choices: Choices, inside: BatteryArrays, tangents: bool) -
     return 2.0 * np.abs(choices.power_w) * (4.0 + grown + rise * np.minimum(grown, STEEPEST) ** 3)
 
 
+def _greatest_switch_j(choices: Choices) -> Array:
+    """(time,) magnitude of the most that switching can take at each step."""
+    case, _, energy_j, _ = choices.switching
+    most: Array = np.abs(energy_j).max(axis=(1, 2))[case]
+    return most
+
+
 def step_maxima(choices: Choices, figure: Array) -> Array:
     """(time,) greatest of an (entry,) figure in each step, 0 where a step has no entry or less."""
     greatest = np.zeros(choices.steps)
@@ -145,77 +149,88 @@ def step_maxima(choices: Choices, figure: Array) -> Array:
     return greatest
 
 
-def dual(
-    problem: Problem,
-    choices: Choices,
-    worth: Array,
-    constant: float,
-    end_price: float,
-    rounding_kg: float,
-) -> list[Line]:
-    """Supporting lines, up to the maximum over the scale s >= 0, of
-    g(s) = min over paths of sum [cost_i + s worth_i + switching] + s constant.
+@dataclass(frozen=True, slots=True, eq=False)
+class Priced:
+    """The priced part of a dual, all at scale 1.
 
-    worth: (entry,) priced part of each choice at scale 1; end_price: price of the end charge at scale 1;
-    rounding_kg: what rounding can do to the priced part at scale 1
+    worth: (entry,) of each choice; before: (time,) price of stored energy that switching takes before each step
+    constant: what the ends count; end_price: price of the end charge; rounding_kg: what rounding can do to it all
+    """
+
+    worth: Array
+    before: Array
+    constant: float
+    end_price: float
+    rounding_kg: float
+
+
+def dual(problem: Problem, choices: Choices, priced: Priced) -> list[Line]:
+    """Supporting lines, up to the maximum over the scale S >= 0, of
+    g(S) = min over paths of sum [cost_i + S worth_i + K + S before s] + S constant.
+
     Raises InfeasibleError where no path is open, or every path's priced part is above 0 by more than rounding:
     then g has no maximum, and no plan reaches the end charge.
     """
-    priced = _Priced(problem, choices, worth, constant, end_price, rounding_kg)
-    lines = maximise(priced.line, typical_price_kgpj(choices, worth), priced.steepest)
+    paths = _Paths(problem, choices, priced)
+    lines = maximise(paths.line, typical_price_kgpj(choices, priced.worth), paths.steepest)
     fallen_kg = 2.0 * float(np.sum(step_maxima(choices, -choices.cost_kg)))
     many = EPSILON * (2 * choices.steps + 48)
 
     def lowered(line: Line) -> Line:
-        own_kg = abs(line.value_kg - line.scale * constant)
-        allowance_kg = many * (own_kg + fallen_kg) + line.scale * rounding_kg
+        own_kg = abs(line.value_kg - line.scale * priced.constant)
+        allowance_kg = many * (own_kg + fallen_kg) + line.scale * priced.rounding_kg
         return replace(line, value_kg=line.value_kg - allowance_kg - TINY * (line.scale > 0))
 
     return sorted(map(lowered, lines), key=lambda line: line.value_kg)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Priced:
+class _Paths:
     """Choices under a price, and shortest paths over them."""
 
     problem: Problem
     choices: Choices
-    worth: Array
-    constant: float
-    end_price: float
-    rounding_kg: float
+    priced: Priced
 
     def line(self, scale: float) -> Line:
         """g's supporting line at a scale."""
-        value, path = self._shortest(self.choices, self.choices.cost_kg + scale * self.worth)
-        return Line(scale, value + scale * self.constant, self._slope(path), scale * self.end_price)
+        priced = self.priced
+        value_kg = self.choices.cost_kg + scale * priced.worth
+        total, path = self._shortest(self.choices, value_kg, scale * priced.before)
+        end_price = scale * priced.end_price
+        return Line(scale, total + scale * priced.constant, self._slope(path), end_price)
 
     def steepest(self) -> tuple[float, float]:
         """Cost and slope of the path whose priced part is least: g's line at a scale without end."""
-        free = frozen("switching", np.zeros_like(self.choices.switch_kg))
-        _, path = self._shortest(self.choices._replace(switch_kg=free), self.worth)
+        switching = self.choices.switching
+        free = switching._replace(kg=frozen("switching", np.zeros_like(switching.kg)))
+        choices = self.choices._replace(switching=free)
+        _, path = self._shortest(choices, self.priced.worth, self.priced.before)
         slope = self._slope(path)
         # A plan that misses the end by no more than it may is one: g then rises without end, but slowly.
-        if slope > self.end_price * end_slack_j(self.problem):
+        if slope > self.priced.end_price * end_slack_j(self.problem):
             raise InfeasibleError(
                 "the end charge cannot be reached by any plan; ask for a lower soc_end or widen the window"
             )
-        table, controls = self.problem.table, self.choices.control[path]
-        mode = table.mode[controls]
-        before = np.concatenate([[self.problem.start_mode], mode[:-1]])
-        cost = self.choices.cost_kg[path] + table.switch_fuel_kg[before, mode]
-        return float(np.sum(cost)), slope
+        return float(np.sum(self.choices.cost_kg[path] + self._switched(path).kg)), slope
 
-    def _shortest(self, choices: Choices, value: Array) -> tuple[float, Indices]:
-        total, path, _ = shortest_path(choices, value, self.problem.start_mode)
+    def _switched(self, path: Indices) -> Switched:
+        return switched(self.problem.table, self.problem.start_mode, self.choices.control[path])
+
+    def _shortest(
+        self, choices: Choices, value_kg: Array, before_kgpj: Array
+    ) -> tuple[float, Indices]:
+        total, path, _ = shortest_path(choices, value_kg, before_kgpj, self.problem.start_mode)
         if not np.isfinite(total):
             raise InfeasibleError(_no_path(choices, self.problem))
         return total, path
 
     def _slope(self, path: Indices) -> float:
-        slope = float(np.sum(self.worth[path])) + self.constant
+        priced = self.priced
+        slope = float(np.sum(priced.worth[path])) + priced.constant
+        slope += float(np.sum(priced.before * self._switched(path).energy_j))
         # End charge that is missing by rounding alone must not send the price to infinity.
-        return 0.0 if abs(slope) <= self.rounding_kg else slope
+        return 0.0 if abs(slope) <= priced.rounding_kg else slope
 
 
 def _no_path(choices: Choices, problem: Problem) -> str:
@@ -223,7 +238,8 @@ def _no_path(choices: Choices, problem: Problem) -> str:
     modes = np.arange(choices.modes) == problem.start_mode
     for k in range(choices.steps):
         filled = choices.first[k, 1:] > choices.first[k, :-1]
-        modes = (choices.switch_allowed & modes[:, None]).any(axis=0) & filled
+        allowed = choices.switching.allowed[choices.switching.case[k]]
+        modes = (allowed & modes[:, None]).any(axis=0) & filled
         if not modes.any():
             why = "every switch is forbidden"
             if not filled.any():
@@ -233,63 +249,6 @@ def _no_path(choices: Choices, problem: Problem) -> str:
                 "see reject and switch_allowed of the table"
             )
     return "no path over the modes"
-
-
-def maximise(
-    evaluate: Callable[[float], Line], guess: float, steepest: Callable[[], tuple[float, float]]
-) -> list[Line]:
-    """Supporting lines of a concave piecewise-linear function of a scale >= 0, the highest last.
-
-    steepest: intercept and slope of its line at a scale without end, asked for where it still rises at 4^16
-    guesses; raises an error where the function has no maximum. Where the search is cut short the lines found so
-    far are what is known: each of them is a bound.
-    """
-    line = evaluate(0.0)
-    lines, scale, right = [line], guess, None
-    left = _Touch.of(line)
-    for _ in range(_QUADRUPLINGS_MAX if line.slope_kg > 0 else 0):
-        line = evaluate(scale)
-        lines.append(line)
-        if line.slope_kg <= 0:
-            right = _Touch.of(line)
-            break
-        left = _Touch.of(line)
-        scale *= 4.0
-    if left.slope_kg > 0 and right is None:
-        right = _Touch(np.inf, *steepest())
-    for _ in range(_LINES_MAX):
-        if right is None:
-            break
-        best = max(line.value_kg for line in lines)
-        crossing, top = _crossing(left, right)
-        inside = left.scale < crossing < right.scale
-        if not inside or top - best <= _RELATIVE_TOLERANCE * abs(top):
-            break
-        line = evaluate(crossing)
-        lines.append(line)
-        left, right = (_Touch.of(line), right) if line.slope_kg > 0 else (left, _Touch.of(line))
-    return sorted(lines, key=lambda line: line.value_kg)
-
-
-@dataclass(frozen=True, slots=True)
-class _Touch:
-    """A supporting line by where it touches and its value at scale 0."""
-
-    scale: float
-    intercept_kg: float
-    slope_kg: float
-
-    @classmethod
-    def of(cls, line: Line) -> "_Touch":
-        return cls(line.scale, line.value_kg - line.slope_kg * line.scale, line.slope_kg)
-
-
-def _crossing(left: _Touch, right: _Touch) -> tuple[float, float]:
-    """Scale and value where two supporting lines meet; the left line's own point where they do not."""
-    if left.slope_kg <= right.slope_kg:
-        return left.scale, left.intercept_kg + left.slope_kg * left.scale
-    crossing = (right.intercept_kg - left.intercept_kg) / (left.slope_kg - right.slope_kg)
-    return crossing, left.intercept_kg + left.slope_kg * crossing
 
 
 def typical_price_kgpj(choices: Choices, drain_j: Array) -> float:

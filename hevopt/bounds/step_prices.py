@@ -1,14 +1,16 @@
 """Duals with a price for every step: tighter where losses depend on charge, or where the SOC window binds.
 
-With prices p_1 ... p_T on stored energy x_1 ... x_T and the step x_t+1 = x_t - r_t(x_t, u), Lagrange duality gives,
-for every choice of prices >= 0, a bound on every feasible plan:
+With prices p_1 ... p_T on stored energy x_1 ... x_T, switching y_t = x_t - s_t(m, m') and the step
+x_t+1 = y_t - r_t(y_t, u), Lagrange duality gives, for every choice of prices >= 0, a bound on every feasible plan:
 
-    g(p) = sum over t of  min over u, x of [cost_t(u) + p_t+1 r_t(x, u) + (p_t - p_t+1) x]  + switching
-           + p_T x_end - p_1 x_start
+    g(p) = sum over t of  min over u, y of [cost_t(u) + p_t+1 r_t(y, u) + (p_t - p_t+1) y]
+           + K_t(m, m') + p_t s_t(m, m')  + p_T x_end - p_1 x_start
 
-with x within the SOC window (t = 0: x = x_start and no x term) and the switching costs exact, a shortest path over
-modes. g is positively homogeneous in p but for the costs, so a shape of p is scaled to the maximum of g
-(prices.py).
+Proof: multiply x_t+1 - y_t + r_t <= 0 by p_t+1 and y_t - x_t + s_t = 0 by p_t and add; p_t x_t cancels but at the
+ends. At t = 0 x is x_start, so that y = x_start - s_0 is known and has no term of its own, and s_0 is charged p_1.
+Every plan keeps y within the SOC window, over which the minimum is taken; fuel K and energy s of switching do not
+depend on the control and are exact, a shortest path over modes. (Below x is written for y.) g is positively
+homogeneous in p but for the costs, so a shape of p is scaled to the maximum of g (prices.py).
 Shapes, both along a rollout:
     costate prices  p_t = p_t+1 (1 - dr_t/dx): then x is stationary where the rollout is
     LP prices       multipliers of the linear program that lets controls be mixed, ignores switching and keeps x
@@ -32,13 +34,22 @@ import numpy as np
 
 from hevopt.bounds import _step_prices_kernels as kernels
 from hevopt.bounds._step_prices_kernels import WindowCells
-from hevopt.bounds.prices import EPSILON, STEEPEST, Line, bounded_choices, dual, priced_rounding
+from hevopt.bounds.lines import Line
+from hevopt.bounds.prices import (
+    EPSILON,
+    STEEPEST,
+    Priced,
+    before_steps,
+    bounded_choices,
+    dual,
+    priced_rounding,
+)
 from hevopt.errors import SolverError
 from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Flags
-from hevopt.problem.choices import Choices, without_dominated
+from hevopt.problem.choices import Choices, State, without_dominated
 from hevopt.problem.problem import Problem, Trajectory
 
 CELLS = 256
@@ -52,7 +63,9 @@ def costate_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
     """Lines of the dual whose prices follow the costate equation along a rollout, the highest last."""
     inside = problem.battery.within_window()
     power, step_s = rollout.battery_power_w, problem.table.step_s
-    return dual_of_shape(problem, rollout, kernels.costate(rollout.energy_j, power, step_s, inside))
+    return dual_of_shape(
+        problem, rollout, kernels.costate(_between_j(rollout), power, step_s, inside)
+    )
 
 
 def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
@@ -71,17 +84,24 @@ def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[L
     choices = without_dominated(bounded_choices(problem))
     inside = problem.battery.within_window()
     line = line_above(inside)
+    start = State(problem.start_mode, problem.start_j)
     if line is not None:
         window = float(line.energy_j[0]), float(line.energy_j[1])
         worth = kernels.worth_by_tangents(
-            choices, price, problem.start_j, rollout.energy_j, steep(choices, line), window, line
+            choices, price, start, _between_j(rollout), steep(choices, line), window, line
         )
     else:
         cells = window_cells(problem, CELLS)
-        worth = kernels.worth_by_cells(choices, price, problem.start_j, cells, inside)
+        worth = kernels.worth_by_cells(choices, price, start, cells, inside)
     constant = price[-1] * problem.end_min_j - price[0] * problem.start_j
     rounding = priced_rounding(problem, choices, price, tangents=line is not None)
-    return dual(problem, choices, worth, float(constant), float(price[-1]), rounding)
+    priced = Priced(worth, before_steps(price), float(constant), float(price[-1]), rounding)
+    return dual(problem, choices, priced)
+
+
+def _between_j(rollout: Trajectory) -> Array:
+    """(time,) stored energy between switching and step."""
+    return rollout.energy_j[:-1] - rollout.switch_energy_j
 
 
 def line_above(inside: BatteryArrays) -> BatteryArrays | None:
@@ -114,6 +134,8 @@ def steep(choices: Choices, battery: BatteryArrays) -> Flags:
 def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     """(time,) multipliers of the energy steps: minimise cost over mixtures of controls, x in the window.
 
+    Switching takes what it takes on the rollout.
+
     Long drives are given to it in parts, from the end. Each reaches into the next by some steps, counts what is
     left there at the price that the next has found for it, and is believed up to where the next begins.
     """
@@ -123,11 +145,12 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     price = np.zeros(choices.steps)
     low, high = problem.window_j
     # Beyond the window, where rounding may lead, a control at the battery's limit may have no current.
-    energy_j = np.clip(rollout.energy_j, low, high)
+    energy_j = np.clip(rollout.energy_j[:-1], low, high)
+    between_j = np.clip(_between_j(rollout), low, high)
     for begin, end in reversed(list(pairwise(ends))):
         reach = min(end + _LP_OVERLAP, choices.steps)
         wanted = (problem.end_min_j, 0.0) if reach == choices.steps else (low, price[reach - 1])
-        along = energy_j[begin:reach], rollout.battery_power_w[begin:reach]
+        along = energy_j[begin:reach], between_j[begin:reach], rollout.battery_power_w[begin:reach]
         found = _lp_part(problem, choices.part(begin, reach), *along, *wanted)
         price[begin:end] = found[: end - begin]
     return price
@@ -137,13 +160,15 @@ def _lp_part(
     problem: Problem,
     choices: Choices,
     energy_j: Array,
+    between_j: Array,
     power_w: Array,
     end_min_j: float,
     end_price_kgpj: float,
 ) -> Array:
     """(time,) multipliers of consecutive steps, what is left at their end being at least end_min_j and priced.
 
-    energy_j, power_w: (time,) along a rollout, whose first stored energy is where they start
+    energy_j, between_j, power_w: (time,) along a rollout, whose first stored energy is where they start, before and
+    after switching
 
     The mixtures of a step cost the lower hull of its controls' cost over drain; from the corner of least drain
     the hull falls segment by segment, ever less steeply, so that segments bounded by 0 and 1 are all it needs.
@@ -153,7 +178,7 @@ def _lp_part(
 
     step = choices.spread(np.arange(choices.steps))
     inside_window = problem.battery.within_window()
-    drain_j, keep_j = kernels.linear_steps(choices, energy_j, power_w, inside_window)
+    drain_j, keep_j = kernels.linear_steps(choices, between_j, power_w, inside_window)
     order = np.lexsort((choices.cost_kg, drain_j, step))
     corner = order[kernels.lower_hull(step, drain_j, choices.cost_kg, order)[order]]
     step, drain_j, cost_kg = step[corner], drain_j[corner], choices.cost_kg[corner]
@@ -175,7 +200,8 @@ def _lp_part(
         ),
         shape=(steps, segments + steps),
     )
-    offset = ((1.0 - keep_j) * energy_j - least_j) / scale_j
+    taken_j = energy_j - between_j
+    offset = ((1.0 - keep_j) * energy_j - taken_j - least_j) / scale_j
     offset[0] += keep_j[0] * energy_j[0] / scale_j
     bounds = np.empty((segments + steps, 2))
     bounds[:segments] = 0.0, 1.0

@@ -15,7 +15,7 @@ from hevopt.powertrain.phases import Driver, driver_of, stretches
 from hevopt.powertrain.rejects import Bits, bits, function_rejects, limit_rejects
 from hevopt.problem.arrays import Array
 from hevopt.problem.battery import within_limits
-from hevopt.problem.table import Reject
+from hevopt.problem.reject import Reject
 
 _ROUNDING_W = 1e-9
 

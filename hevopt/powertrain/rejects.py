@@ -10,7 +10,7 @@ from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.car.parts import WHEEL
 from hevopt.powertrain.operation import Setting
 from hevopt.problem.arrays import Array, Flags
-from hevopt.problem.table import Reject
+from hevopt.problem.reject import Reject
 
 Bits = NDArray[np.uint16]
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from hevopt.car.architecture import Architecture
 from hevopt.driving.demand import Demand
 from hevopt.problem.arrays import Array, Flags
-from hevopt.problem.table import REJECT_WORDS, Reject
+from hevopt.problem.reject import REJECT_WORDS, Reject
 
 Bits = NDArray[np.uint16]
 _LISTED = 12

@@ -103,12 +103,18 @@ def drain_and_slope(power: float, energy: float, battery: BatteryArrays) -> tupl
 
 
 @compiled()
-def trace(start_j: float, power_w: Array, step_s: Array, battery: BatteryArrays) -> Array:
-    """Stored energy after every step, (time + 1,), by the step all parts of hevopt share."""
+def trace(
+    start_j: float, switch_j: Array, power_w: Array, step_s: Array, battery: BatteryArrays
+) -> Array:
+    """Stored energy after every step, (time + 1,), by the step all parts of hevopt share.
+
+    switch_j: (time,) taken before the step, at whose outcome the step is made
+    """
     energy = np.empty(len(power_w) + 1)
     energy[0] = start_j
     for k in range(len(power_w)):
-        energy[k + 1] = energy[k] - step_s[k] * chemical_power_at(power_w[k], energy[k], battery)
+        switched = energy[k] - switch_j[k]
+        energy[k + 1] = switched - step_s[k] * chemical_power_at(power_w[k], switched, battery)
     return energy
 
 

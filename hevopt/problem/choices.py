@@ -4,7 +4,7 @@ Entry i of a list is one control at one step. The entries of step k that lead to
 first[k, m] <= i < first[k, m + 1].
 """
 
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,14 @@ from hevopt.errors import InfeasibleError
 from hevopt.problem._choices_kernels import undominated
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.problem import Problem
+from hevopt.problem.switching import Number, Switching, switching_of
 
-Number = TypeVar("Number", bound=np.generic)
+
+class State(NamedTuple):
+    """Mode and stored energy before a step."""
+
+    mode: int
+    energy_j: float
 
 
 class Choices(NamedTuple):
@@ -23,7 +29,7 @@ class Choices(NamedTuple):
     first: (time, mode + 1) start of each block; its last column ends the step's block
     control: (entry,) column of the control table
     cost_kg, power_w: (entry,) cost without switching, battery power
-    step_s: (time,); switch_kg, switch_allowed: (mode, mode) [from, to]
+    step_s: (time,)
     """
 
     first: Indices
@@ -31,8 +37,7 @@ class Choices(NamedTuple):
     cost_kg: Array
     power_w: Array
     step_s: Array
-    switch_kg: Array
-    switch_allowed: Flags
+    switching: Switching
 
     @property
     def steps(self) -> int:
@@ -52,18 +57,19 @@ class Choices(NamedTuple):
             cost_kg=self.cost_kg[low:high],
             power_w=self.power_w[low:high],
             step_s=self.step_s[begin:end],
+            switching=self.switching.part(begin, end),
         )
 
     @property
     def modes(self) -> int:
         """Number of modes."""
-        return len(self.switch_kg)
+        return int(self.switching.kg.shape[1])
 
 
 def choices_of(problem: Problem) -> Choices:
     """All feasible controls of a problem, by step, mode and column."""
     table = problem.table
-    modes = len(table.switch_fuel_kg)
+    modes = table.modes
     columns = np.argsort(table.mode, kind="stable")
     step, position = np.nonzero(table.feasible[:, columns])
     control = columns[position]
@@ -77,8 +83,7 @@ def choices_of(problem: Problem) -> Choices:
         problem.cost_kg[step, control],
         table.battery_power_w[step, control],
         table.step_s,
-        table.switch_fuel_kg,
-        table.switch_allowed,
+        switching_of(table),
     )
 
 

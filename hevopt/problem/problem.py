@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from hevopt.display.axes import Panel, drawn_over_time, speed_panel
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
+from hevopt.problem.arrays import Array
 from hevopt.problem.battery import Battery, energy_j, within_limits
-from hevopt.problem.table import Array, ControlTable, Reject
+from hevopt.problem.reject import Reject
+from hevopt.problem.table import ControlTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,10 +57,8 @@ class Problem(Shown):
                 )
         if not (np.isfinite(self.nox_weight) and 0 <= self.nox_weight <= 1e6):
             raise DataError(f"nox_weight {self.nox_weight}; allowed: 0 to 1e6 kg fuel per kg NOx")
-        if not 0 <= self.start_mode < len(self.table.switch_fuel_kg):
-            raise DataError(
-                f"start_mode {self.start_mode}; allowed: 0 to {len(self.table.switch_fuel_kg) - 1}"
-            )
+        if not 0 <= self.start_mode < self.table.modes:
+            raise DataError(f"start_mode {self.start_mode}; allowed: 0 to {self.table.modes - 1}")
         beyond = ~within_limits(self.battery, self.table.battery_power_w)
         if (self.table.feasible & beyond).any():
             bits = np.where(beyond, np.uint16(Reject.BATTERY_LIMIT), np.uint16(0))
@@ -113,6 +113,7 @@ class Trajectory(Shown):
 
     energy_j, soc: (time + 1,), stored energy and state of charge at the steps' ends
     mode, fuel_kg, nox_kg, battery_power_w: (time,); fuel includes the cost of switching in its step
+    switch_fuel_kg, switch_energy_j: (time,) what switching took, the energy from the battery before the step
     flows: name -> (time,) powers, speeds, torques and losses
     residuals: component -> (time,) power balance, in W, 0 up to rounding
     """
@@ -124,6 +125,7 @@ class Trajectory(Shown):
     mode: NDArray[np.int64]
     fuel_kg: Array
     switch_fuel_kg: Array
+    switch_energy_j: Array
     nox_kg: Array
     battery_power_w: Array
     cost_kg: float
@@ -179,7 +181,7 @@ class Trajectory(Shown):
             "energy_start_j": self.energy_j[:-1],
             "energy_end_j": self.energy_j[1:],
         }
-        for name in ("fuel_kg", "switch_fuel_kg", "nox_kg", "battery_power_w"):
+        for name in ("fuel_kg", "switch_fuel_kg", "switch_energy_j", "nox_kg", "battery_power_w"):
             columns[name] = getattr(self, name)
         columns |= self.flows
         if table.missing_torque_nm is not None:

@@ -18,7 +18,9 @@ from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.flows import Flows
 from hevopt.problem.problem import Problem, Trajectory
-from hevopt.problem.table import REJECT_WORDS, ControlTable
+from hevopt.problem.reject import REJECT_WORDS
+from hevopt.problem.switching import switched
+from hevopt.problem.table import ControlTable
 
 
 def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
@@ -30,33 +32,33 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     table = problem.table
     control = _indices(table, control)
     steps = np.arange(len(control))
-    mode = table.mode[control]
-    before = np.concatenate([[problem.start_mode], mode[:-1]])
-    if not table.switch_allowed[before, mode].all():
-        k = int(np.argmin(table.switch_allowed[before, mode]))
+    switch = switched(table, problem.start_mode, control)
+    if not switch.allowed.all():
+        k = int(np.argmin(switch.allowed))
         raise InfeasibleError(
-            f"forbidden switch from mode {before[k]} to {mode[k]} at step {k} "
+            f"forbidden switch from mode {switch.before[k]} to {switch.mode[k]} at step {k} "
             f"(t = {table.time_s[k]:g} s)"
         )
     power_w = table.battery_power_w[steps, control]
-    energy_j = trace(problem.start_j, power_w, table.step_s, problem.battery.arrays)
-    _check_window(problem, energy_j)
-    switch_kg = table.switch_fuel_kg[before, mode]
-    fuel_kg = table.fuel_kg[steps, control] + switch_kg
+    arrays = problem.battery.arrays
+    energy_j = trace(problem.start_j, switch.energy_j, power_w, table.step_s, arrays)
+    _check_window(problem, energy_j, switch.energy_j)
+    fuel_kg = table.fuel_kg[steps, control] + switch.kg
     nox_kg = table.nox_kg[steps, control]
     flows = cast(Flows, table.flows).along(control)
-    flows |= _battery_flows(problem, energy_j, power_w)
+    flows |= _battery_flows(problem, energy_j, switch.energy_j, power_w)
     return Trajectory(
         problem=problem,
         control=control,
         energy_j=energy_j,
         soc=battery_model.soc(problem.battery, energy_j),
-        mode=mode,
+        mode=switch.mode,
         fuel_kg=fuel_kg,
-        switch_fuel_kg=switch_kg,
+        switch_fuel_kg=switch.kg,
+        switch_energy_j=switch.energy_j,
         nox_kg=nox_kg,
         battery_power_w=power_w,
-        cost_kg=float(np.sum(problem.cost_kg[steps, control] + switch_kg)),
+        cost_kg=float(np.sum(problem.cost_kg[steps, control] + switch.kg)),
         flows=flows,
         residuals=_residuals(table, flows, power_w),
     )
@@ -66,11 +68,11 @@ def total_cost_kg(problem: Problem, control: Indices) -> tuple[float, Array]:
     """Cost and stored energy of control indices, without the checks: for searches inside strategies."""
     table = problem.table
     steps = np.arange(len(control))
-    mode = table.mode[control]
-    before = np.concatenate([[problem.start_mode], mode[:-1]])
-    cost = np.sum(problem.cost_kg[steps, control] + table.switch_fuel_kg[before, mode])
+    switch = switched(table, problem.start_mode, control)
+    cost = np.sum(problem.cost_kg[steps, control] + switch.kg)
     power_w = table.battery_power_w[steps, control]
-    return float(cost), trace(problem.start_j, power_w, table.step_s, problem.battery.arrays)
+    arrays = problem.battery.arrays
+    return float(cost), trace(problem.start_j, switch.energy_j, power_w, table.step_s, arrays)
 
 
 def _indices(table: ControlTable, plan: ArrayLike) -> Indices:
@@ -110,29 +112,36 @@ def _check_usable(table: ControlTable, control: Indices) -> None:
         )
 
 
-def _check_window(problem: Problem, energy_j: Array) -> None:
+def _check_window(problem: Problem, energy_j: Array, switch_j: Array) -> None:
+    """InfeasibleError where a plan leaves the window first, between switching and step or after a step."""
     low, high = problem.battery.granted_window_j
-    inside = (energy_j >= low) & (energy_j <= high)
-    if not inside.all():
-        k = int(np.argmin(inside))
-        found = "more than the battery's voltage can deliver"
-        if np.isfinite(energy_j[k]):
-            found = f"SOC {float(battery_model.soc(problem.battery, energy_j[k])):.4f}"
-        raise InfeasibleError(
-            f"{found} after step {k - 1} (t = {problem.table.time_s[k - 1]:g} s); allowed: "
-            f"{problem.battery.soc_min:g} to {problem.battery.soc_max:g}"
-        )
+    points = np.empty((len(switch_j), 2))
+    points[:, 0], points[:, 1] = energy_j[:-1] - switch_j, energy_j[1:]
+    inside = (points >= low) & (points <= high)
+    if inside.all():
+        return
+    k, after = divmod(int(np.argmin(inside.ravel())), 2)
+    found = "more than the battery's voltage can deliver"
+    if np.isfinite(points[k, after]):
+        found = f"SOC {float(battery_model.soc(problem.battery, points[k, after])):.4f}"
+    where = "after" if after else f"where switching takes {switch_j[k]:.6g} J, before"
+    raise InfeasibleError(
+        f"{found} {where} step {k} (t = {problem.table.time_s[k]:g} s); allowed: "
+        f"{problem.battery.soc_min:g} to {problem.battery.soc_max:g}"
+    )
 
 
-def _battery_flows(problem: Problem, energy_j: Array, power_w: Array) -> dict[str, Array]:
-    """Losses from current and resistance, to hold against the change of stored energy."""
-    pack = problem.battery
-    _, voltage, discharge, charge = battery_model.states(pack, energy_j[:-1])
+def _battery_flows(
+    problem: Problem, energy_j: Array, switch_j: Array, power_w: Array
+) -> dict[str, Array]:
+    """Losses from current and resistance, to hold against the change of stored energy in the step itself."""
+    pack, between_j = problem.battery, energy_j[:-1] - switch_j
+    _, voltage, discharge, charge = battery_model.states(pack, between_j)
     resistance = np.where(power_w < 0, charge, discharge)
     current = battery_model.source_power_w(power_w, voltage, resistance)[0] / voltage
     coulombic = (1 - pack.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
     return {
-        "battery_chemical_w": -np.diff(energy_j) / problem.table.step_s,
+        "battery_chemical_w": (between_j - energy_j[1:]) / problem.table.step_s,
         "battery_loss_w": resistance * current**2 + coulombic,
         "battery_voltage_v": voltage - resistance * current,
         "battery_current_a": current,

@@ -1,8 +1,7 @@
-"""Carried out of hevopt/problem.py."""
+"""The control table: what every control burns and draws at every step, and what it costs to switch."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from enum import IntFlag
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,47 +9,17 @@ from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
+from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.flows import Flows, GivenFlows
 from hevopt.problem.frozen import frozen
+from hevopt.problem.reject import REJECT_WORDS, Reject
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
-
-_MODES_MAX = 1000
-
-
-class Reject(IntFlag):
-    """Why a control cannot be used at a step."""
-
-    ENGINE_TORQUE = 1
-    ENGINE_SPEED = 2
-    ENGINE_MAP = 4
-    MACHINE_LIMIT = 8
-    MACHINE_SPEED = 16
-    BATTERY_LIMIT = 32
-    NO_PATH = 64
-    FUNCTION = 128
-    DUPLICATE = 256
-    GIVEN = 512
-    MACHINE_MAP = 1024
-
-
-REJECT_WORDS: dict[Reject, str] = {
-    Reject.ENGINE_TORQUE: "engine torque",
-    Reject.ENGINE_SPEED: "engine speed",
-    Reject.ENGINE_MAP: "outside the engine map",
-    Reject.MACHINE_LIMIT: "machine torque or power",
-    Reject.MACHINE_SPEED: "machine speed",
-    Reject.BATTERY_LIMIT: "battery limit",
-    Reject.NO_PATH: "torque does not reach the wheels",
-    Reject.FUNCTION: "function not in the architecture",
-    Reject.DUPLICATE: "same as another control",
-    Reject.GIVEN: "marked as not feasible",
-    Reject.MACHINE_MAP: "outside the machine map",
-}
+MODES_MAX = 1000
+_SWITCHING = ("switch_fuel_kg", "switch_allowed", "switch_energy_j")
 
 
 class Control(NamedTuple):
@@ -69,8 +38,8 @@ class Signals(Shown):
 
     speed_mps: Array
     wheel_power_w: Array
-    gear: NDArray[np.int64]
-    clutch_open: NDArray[np.bool_]
+    gear: Indices
+    clutch_open: Flags
 
     def __post_init__(self) -> None:
         _freeze(self, {"gear": np.int64, "clutch_open": np.bool_}, "signals: ")
@@ -87,7 +56,8 @@ class ControlTable(Shown):
     fuel_kg, nox_kg, battery_power_w: (time, control) per step; finite also where rejected
     reject: (time, control) bits of Reject, 0 = feasible
     mode: (control,) discrete state the control leads to
-    switch_fuel_kg, switch_allowed: (mode, mode) [from, to]
+    switch_fuel_kg, switch_allowed, switch_energy_j: (mode, mode) [from, to], or one for each step, (time, mode,
+    mode); the energy is taken from what the battery stores, before the step, > 0 where going there takes some
     flows: name -> (time, control) powers, speeds and torques for the energy balance; may be empty
     missing_torque_nm: (time,) wheel torque that no control could deliver and that was left undriven
     """
@@ -98,31 +68,34 @@ class ControlTable(Shown):
     nox_kg: Array
     battery_power_w: Array
     reject: NDArray[np.uint16]
-    mode: NDArray[np.int64]
+    mode: Indices
     switch_fuel_kg: Array
-    switch_allowed: NDArray[np.bool_]
+    switch_allowed: Flags
     controls: tuple[Control, ...]
     signals: Signals | None = None
     flows: Mapping[str, Array] = field(default_factory=dict)
     missing_torque_nm: Array | None = None
+    switch_energy_j: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @classmethod
     def from_arrays(
         cls,
         fuel_kg: Array,
         battery_power_w: Array,
-        feasible: NDArray[np.bool_] | None = None,
+        feasible: Flags | None = None,
         *,
         step_s: float | Array = 1.0,
         nox_kg: Array | None = None,
-        mode: NDArray[np.int64] | None = None,
+        mode: Indices | None = None,
         switch_fuel_kg: Array | None = None,
-        switch_allowed: NDArray[np.bool_] | None = None,
+        switch_allowed: Flags | None = None,
+        switch_energy_j: Array | None = None,
     ) -> "ControlTable":
         """A table from (time, control) arrays alone: any cost in kg, battery power, and what can be used.
 
         Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is
-        one, and nothing costs to switch; with it, `switch_fuel_kg` is (mode, mode), by default 0.
+        one, and nothing costs to switch; with it, `switch_fuel_kg` and `switch_energy_j` are (mode, mode) or (time,
+        mode, mode), by default 0.
         Raises DataError where shapes do not agree or usable entries are not finite.
         """
         fuel, power = frozen("fuel_kg", fuel_kg), frozen("battery_power_w", battery_power_w)
@@ -135,16 +108,11 @@ class ControlTable(Shown):
         nox = np.zeros_like(fuel) if nox_kg is None else frozen("nox_kg", nox_kg)
         if usable.shape != fuel.shape or nox.shape != fuel.shape:
             raise DataError(f"feasible and nox_kg must have the shape of fuel_kg, {fuel.shape}")
-        steps = frozen("step_s", step_s)
-        if steps.shape not in ((), (1,), fuel.shape[:1]):
-            raise DataError(
-                f"step_s has shape {steps.shape}; allowed: one number, or one per step, {fuel.shape[:1]}"
-            )
-        steps = np.broadcast_to(steps, fuel.shape[:1])
+        steps = _one_per_step(step_s, fuel.shape[:1])
         modes = frozen("mode", np.zeros(fuel.shape[1]) if mode is None else mode, np.int64)
         switch = _no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
         switch = frozen("switch_fuel_kg", switch)
-        allowed = np.ones(switch.shape, np.bool_) if switch_allowed is None else switch_allowed
+        allowed = np.ones(switch.shape[-2:], np.bool_) if switch_allowed is None else switch_allowed
         return cls(
             time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
             step_s=steps,
@@ -156,10 +124,14 @@ class ControlTable(Shown):
             switch_fuel_kg=switch,
             switch_allowed=allowed,
             controls=tuple(Control(True, 0, str(c)) for c in range(fuel.shape[1])),
+            switch_energy_j=np.zeros((0, 0)) if switch_energy_j is None else switch_energy_j,
         )
 
     def __post_init__(self) -> None:
         types = {"reject": np.uint16, "mode": np.int64, "switch_allowed": np.bool_}
+        if np.shape(self.switch_energy_j) == (0, 0):
+            modes = np.shape(self.switch_fuel_kg)[-1:] * 2
+            object.__setattr__(self, "switch_energy_j", np.zeros(modes))
         _freeze(self, types, "control table: ")
         if not isinstance(self.flows, Flows):
             object.__setattr__(self, "flows", GivenFlows(self.flows, "control table: "))
@@ -181,7 +153,7 @@ class ControlTable(Shown):
                 "and a control at least"
             )
         whole = steps, controls = self.fuel_kg.shape
-        modes = len(self.switch_fuel_kg) if self.switch_fuel_kg.ndim else 0
+        modes = self.modes if self.switch_fuel_kg.ndim > 1 else 0
         expected = {
             "time_s": (steps,),
             "step_s": (steps,),
@@ -189,8 +161,10 @@ class ControlTable(Shown):
             "battery_power_w": whole,
             "reject": whole,
             "mode": (controls,),
-            "switch_fuel_kg": (modes, modes),
-            "switch_allowed": (modes, modes),
+            **{
+                name: (modes, modes) if getattr(self, name).ndim != 3 else (steps, modes, modes)
+                for name in _SWITCHING
+            },
             "missing_torque_nm": (steps,),
         }
         found = {name: getattr(self, name) for name in expected}
@@ -203,13 +177,15 @@ class ControlTable(Shown):
             if values is not None and values.shape != expected.get(name, whole):
                 raise DataError(
                     f"control table: {name} has shape {values.shape}, expected {expected.get(name, whole)}"
-                    " (time, control) or (mode, mode)"
+                    " (time, control), (mode, mode) or (time, mode, mode)"
                 )
         if len(self.controls) != controls:
             raise DataError(f"control table: {len(self.controls)} labels for {controls} controls")
 
     def _check_values(self) -> None:
-        for name in ("step_s", "time_s", "fuel_kg", "nox_kg", "battery_power_w", "switch_fuel_kg"):
+        for name in (
+            "step_s", "time_s", "fuel_kg", "nox_kg", "battery_power_w", "switch_fuel_kg", "switch_energy_j"
+        ):  # fmt: skip
             if not np.isfinite(getattr(self, name)).all():
                 raise DataError(
                     f"control table: {name} holds NaN or infinite values; give any finite value "
@@ -217,18 +193,23 @@ class ControlTable(Shown):
                 )
         if (self.step_s <= 0).any():
             raise DataError("control table: every step_s must be > 0")
-        if self.mode.min() < 0 or self.mode.max() >= len(self.switch_fuel_kg):
+        if self.mode.min() < 0 or self.mode.max() >= self.modes:
             raise DataError(
                 f"control table: mode runs from {self.mode.min()} to {self.mode.max()}; allowed: 0 "
-                f"to {len(self.switch_fuel_kg) - 1}, the size of switch_fuel_kg"
+                f"to {self.modes - 1}, the size of switch_fuel_kg"
             )
         if (self.switch_fuel_kg < 0).any():
             raise DataError("control table: switch_fuel_kg must be >= 0")
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
+    def modes(self) -> int:
+        """Number of modes."""
+        return int(self.switch_fuel_kg.shape[-1])
+
+    @property
+    def feasible(self) -> Flags:
         """(time, control) True where the control can be used."""
-        usable: NDArray[np.bool_] = self.reject == 0
+        usable: Flags = self.reject == 0
         return usable
 
     def _facts(self) -> dict[str, object]:
@@ -236,12 +217,12 @@ class ControlTable(Shown):
         return {
             "steps": steps,
             "controls": controls,
-            "modes": len(self.switch_fuel_kg),
+            "modes": self.modes,
             "duration_s": float(np.sum(self.step_s)),
             "feasible": f"{np.mean(self.reject == 0):.0%}",
         }
 
-    def labels_of(self, control: NDArray[np.int64]) -> dict[str, list[Any]]:
+    def labels_of(self, control: Indices) -> dict[str, list[Any]]:
         """Column name -> what the labels say of each of some controls; a gear of 0 is none, or the cycle's."""
         labels = [self.controls[c] for c in control]
         return {
@@ -287,9 +268,18 @@ def _freeze(parts: Signals | ControlTable, types: Mapping[str, type], place: str
         object.__setattr__(parts, part.name, values)
 
 
-def _no_switching(modes: NDArray[np.int64]) -> Array:
+def _one_per_step(step_s: float | Array, shape: tuple[int, ...]) -> Array:
+    steps = frozen("step_s", step_s)
+    if steps.shape not in ((), (1,), shape):
+        raise DataError(
+            f"step_s has shape {steps.shape}; allowed: one number, or one per step, {shape}"
+        )
+    return np.broadcast_to(steps, shape)
+
+
+def _no_switching(modes: Indices) -> Array:
     """(mode, mode) of 0 for every mode that stands in the list."""
     highest = int(modes.max(initial=0))
-    if not 0 <= highest < _MODES_MAX:
-        raise DataError(f"mode runs to {highest}; allowed: 0 to {_MODES_MAX - 1}")
+    if not 0 <= highest < MODES_MAX:
+        raise DataError(f"mode runs to {highest}; allowed: 0 to {MODES_MAX - 1}")
     return np.zeros((highest + 1, highest + 1))

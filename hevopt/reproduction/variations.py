@@ -12,7 +12,7 @@ from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
-from hevopt.problem.table import Reject
+from hevopt.problem.reject import Reject
 from hevopt.units import KMH_PER_MPS
 
 LOSS_FACTOR, LESS_LOSS_FACTOR, RESISTANCE_FACTOR, HYBRID_MASS_FACTOR = 1.5, 0.5, 2.0, 2.0

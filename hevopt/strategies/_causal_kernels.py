@@ -10,7 +10,8 @@ import numpy as np
 from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.choices import Choices
+from hevopt.problem.choices import Choices, State
+from hevopt.problem.switching import Switching
 
 # Halvings of the bracket in which a factor over past steps is searched.
 _HALVINGS = 14
@@ -21,13 +22,6 @@ class SteadyGrid(NamedTuple):
 
     low_j: float
     cell_j: float
-
-
-class State(NamedTuple):
-    """Mode and stored energy before a step."""
-
-    mode: int
-    energy_j: float
 
 
 class View(NamedTuple):
@@ -58,31 +52,54 @@ class Feedback(NamedTuple):
 
 
 @compiled()
+def _switchable(switching: Switching, case: int, mode: int) -> tuple[float, float]:
+    """Most stored energy that a switch from a mode takes, and least, below 0 where it gives back."""
+    most, least = 0.0, 0.0
+    for n in range(switching.kg.shape[1]):
+        if switching.allowed[case, mode, n]:
+            most = max(most, switching.energy_j[case, mode, n])
+            least = min(least, switching.energy_j[case, mode, n])
+    return most, least
+
+
+@compiled()
 def decide(
     choices: Choices, k: int, state: State, value: Array, grid: SteadyGrid, battery: BatteryArrays
 ) -> tuple[int, State]:
     """Entry and state after the choice of least cost + switching + value ahead.
 
     value: (mode, node), the window's ends being the grid's first and last node.
-    Only choices that stay within the window count; where none does, the one that leaves it least is taken.
+    Only choices that stay within the window count, between switching and step too, and leave room for the next
+    switch, as far as the present step tells; where none does, the one that lacks least room is taken, and the one
+    that leaves the window least where each leaves it.
     """
     first, cost, power = choices.first, choices.cost_kg, choices.power_w
     modes, nodes = value.shape
     mode, energy = state
     low, cell = grid
+    switching, case = choices.switching, choices.switching.case[k]
     high = low + cell * (nodes - 1)
-    _, voltage, discharge, charging = state_at(energy, battery)
+    between = energy
+    _, voltage, discharge, charging = state_at(between, battery)
     best, entry, next_mode, next_energy = np.inf, -1, mode, energy
     least_out, way_out, out_mode, out_energy = np.inf, -1, mode, energy
     for n in range(modes):
-        if not choices.switch_allowed[mode, n]:
+        if not switching.allowed[case, mode, n]:
             continue
+        if energy - switching.energy_j[case, mode, n] != between:
+            between = energy - switching.energy_j[case, mode, n]
+            _, voltage, discharge, charging = state_at(between, battery)
+        switched_out = max(low - between, between - high) if between != energy else -np.inf
+        taken, given = _switchable(switching, case, n)
         for i in range(first[k, n], first[k, n + 1]):
             rate = chemical_power(
                 power[i], voltage, discharge, charging, battery.coulombic_efficiency
             )
-            after = energy - choices.step_s[k] * rate
-            outside = max(low - after, after - high)
+            after = between - choices.step_s[k] * rate
+            outside = max(max(low - after, after - high), switched_out)
+            # Leaving the window is worse than any lack of room.
+            room = min(max(low + taken - after, after - high - given), high - low)
+            outside = room if outside <= 0.0 else outside + (high - low)
             if not outside <= 0.0:  # nor where the voltage cannot deliver the power, NaN
                 if outside < least_out:
                     least_out, way_out, out_mode, out_energy = outside, i, n, after
@@ -90,7 +107,7 @@ def decide(
             place = (after - low) / cell
             j = min(int(place), nodes - 2)
             ahead = value[n, j] + (place - j) * (value[n, j + 1] - value[n, j])
-            total = cost[i] + choices.switch_kg[mode, n] + ahead
+            total = cost[i] + switching.kg[case, mode, n] + ahead
             if total < best:
                 best, entry, next_mode, next_energy = total, i, n, after
     if entry < 0:

@@ -5,6 +5,9 @@ For prices p_1 ... p_T >= 0 on stored energy, and r(P, x) = a - n b the least ra
     g(p) = sum over t of  min over m, P in hull, x in window of [cost(P) + p_t+1 dt r(P, x) + (p_t - p_t+1) x]
            + p_T x_end - p_1 x_start                                      (t = 0: x = x_start, no term in x)
 
+(where switching takes stored energy, x is what it leaves, and the least is that over paths of modes, with fuel and
+priced energy of switching: step_prices.py)
+
 never exceeds the optimum. r is convex in P and x together, so that a tangent plane lies below it everywhere; with
 one per mode the minimum falls apart into the hull's corners and the window's ends. The planes come from the
 solver's multipliers and are evaluated afresh: however inexact the solver, what comes out is a bound.
@@ -12,9 +15,12 @@ solver's multipliers and are evaluated afresh: however inexact the solver, what 
 
 import numpy as np
 
+from hevopt.bounds._prices_kernels import mode_path
+from hevopt.bounds.prices import before_steps
 from hevopt.problem.arrays import Array
 from hevopt.problem.battery import source_power_w
 from hevopt.problem.problem import Problem
+from hevopt.problem.switching import switching_of
 from hevopt.strategies._convex_parts import Cell, Hulls
 
 # At the voltage's peak dr/dP has no end; any slope gives a tangent.
@@ -34,7 +40,10 @@ def dual_value_kg(
     """
     first, step = hulls.first[:-1], hulls.step
     after = price_kgpj[step]
-    place = np.where(step == 0, problem.start_j, np.clip(place_j, cell.low_j, cell.high_j))
+    switching = switching_of(problem.table)
+    start_j = problem.start_j - switching.energy_j[0, problem.start_mode, hulls.mode]
+    place = np.where(step == 0, start_j, place_j)
+    place = np.clip(place, cell.low_j, cell.high_j)
     lines = cell.intercept_v2[:, None] + cell.slope_v2pj[:, None] * (place - cell.low_j)
     line = np.argmin(lines, axis=0)
     squared_v2, steepness = lines[line, np.arange(len(step))], cell.slope_v2pj[line]
@@ -48,8 +57,13 @@ def dual_value_kg(
     ends = np.array([[cell.low_j], [cell.high_j]])
     held = np.min((before - after) * ends + tilt * (ends - place), axis=0)
     total = least_kg + np.where(step == 0, 0.0, held)
-    starts = np.searchsorted(step, np.arange(len(hulls.step_s)))
     ends_kg = price_kgpj[-1] * problem.end_min_j - price_kgpj[0] * problem.start_j
+    if switching.energy_j.any():
+        least = np.full((len(hulls.step_s), problem.table.modes), np.inf)
+        least[step, hulls.mode] = total
+        to_go, _ = mode_path(least, switching, before_steps(price_kgpj))
+        return float(to_go[0, problem.start_mode] + ends_kg)
+    starts = np.searchsorted(step, np.arange(len(hulls.step_s)))
     return float(np.sum(np.minimum.reduceat(total, starts)) + ends_kg)
 
 

@@ -50,9 +50,12 @@ class _Lines(NamedTuple):
     slope_kgpw: Array
 
 
-def optimum(problem: Problem, hulls: Hulls, price_guess_kgpj: float) -> Solution:
+def optimum(
+    problem: Problem, hulls: Hulls, price_guess_kgpj: float, switch_j: Array | None = None
+) -> Solution:
     """The optimum of the convex model; the guess says where its hulls must be fine.
 
+    switch_j: (time,) what switching takes along a mode path; without it switching is for nothing
     InfeasibleError where there is none, SolverError where none was found.
     """
     import cvxpy as cp
@@ -62,15 +65,18 @@ def optimum(problem: Problem, hulls: Hulls, price_guess_kgpj: float) -> Solution
     unit_w = float(np.abs(hulls.power_w).max()) or 1.0
     unit_kg = float(np.abs(hulls.cost_kg).max()) or 1.0
     unit_j = cell.high_j - cell.low_j
-    start, end = ((x - cell.low_j) / unit_j for x in (problem.start_j, problem.end_min_j))
     blocks, steps = len(hulls.step), len(hulls.step_s)
+    taken = np.zeros(steps + 1)
+    taken[:-1] = 0.0 if switch_j is None else switch_j / unit_j
+    start, end = ((x - cell.low_j) / unit_j for x in (problem.start_j, problem.end_min_j))
     share, discharge, charge = (cp.Variable(blocks, nonneg=True) for _ in range(3))
     power, cost, loss, energy = (cp.Variable(blocks) for _ in range(4))
     last = cp.Variable(1)
     of_step = _rows_of(hulls.step, np.ones(blocks), steps).T
     at_step = of_step @ energy
     drain = of_step @ (discharge - cell.efficiency * charge)
-    fall = at_step - cp.hstack([at_step[1:], last])
+    # Stored energy is that between switching and step, but for the last, at the end.
+    fall = at_step - cp.hstack([at_step[1:], last]) - taken[1:]
     # In units of a step's energy rather than the window's: the solver's tolerance is per row.
     unit_step_j = unit_w * float(hulls.step_s.mean())
     stored = cp.multiply(hulls.step_s * (unit_w / unit_step_j), drain) <= fall * (
@@ -81,16 +87,16 @@ def optimum(problem: Problem, hulls: Hulls, price_guess_kgpj: float) -> Solution
         cp.Minimize(cp.sum(cost)),
         [
             stored, of_step @ share == 1, power == discharge - charge - loss,
-            at_step[0] == start, energy >= 0, energy <= share, last >= end, last <= 1,
+            at_step[0] == start - taken[0], energy >= 0, energy <= share, last >= end, last <= 1,
             *_within_hulls(hulls, lines, power, cost, share, unit_w, unit_kg),
             *_cones(cell, share, energy, discharge, charge, loss, unit_w),
         ],
     )  # fmt: skip
-    _run(model)
+    _run(model, exact=switch_j is not None or not problem.table.switch_energy_j.any())
     price = np.maximum(stored.dual_value, 0.0) * (unit_kg / unit_step_j)
     place_j = cell.low_j + unit_j * energy.value / np.maximum(share.value, 1e-9)
     bound = dual_value_kg(problem, hulls, cell, price, place_j)
-    path = cell.low_j + unit_j * np.concatenate([at_step.value, last.value])
+    path = cell.low_j + unit_j * (np.concatenate([at_step.value, last.value]) + taken)
     return Solution(float(model.value) * unit_kg, bound, price, path)
 
 
@@ -164,8 +170,8 @@ def _cones(
     return [*below, cp.SOC(loss + squared, parts, axis=0)]
 
 
-def _run(model: Any) -> None:
-    """Solve, or say why not."""
+def _run(model: Any, *, exact: bool) -> None:
+    """Solve, or say why not; only an exact model can say that there is no plan."""
     import warnings
 
     import cvxpy as cp
@@ -178,7 +184,7 @@ def _run(model: Any) -> None:
         status = model.status
     except cp.SolverError as error:
         status = str(error)
-    if status == cp.INFEASIBLE:
+    if status == cp.INFEASIBLE and exact:
         raise InfeasibleError(
             f"convex: {SOLVER} proves that no mixture of controls keeps the charge within its window and "
             "reaches the asked end charge; ask for a lower soc_end or widen the window"

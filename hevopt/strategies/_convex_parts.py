@@ -14,10 +14,11 @@ from hevopt.strategies._convex_kernels import lower_hulls
 class Hulls(NamedTuple):
     """Corners of lower hulls as flat lists, block by block; a block is an open mode of a step.
 
-    step: (block,), rising; first: (block + 1,); cost_kg, power_w: (corner,); step_s: (time,)
+    step, mode: (block,), steps rising; first: (block + 1,); cost_kg, power_w: (corner,); step_s: (time,)
     """
 
     step: Indices
+    mode: Indices
     first: Indices
     cost_kg: Array
     power_w: Array
@@ -53,10 +54,11 @@ def hulls_of(choices: Choices, modes: Indices | None = None) -> Hulls:
     kept = without_dominated(choices._replace(first=first))
     corner, hull_first = lower_hulls(kept.first, kept.cost_kg, kept.power_w)
     counts = np.diff(hull_first, axis=1)
-    step = np.nonzero(counts)[0]
+    step, column = np.nonzero(counts)
     ends = np.cumsum(counts[counts > 0])
     return Hulls(
         step,
+        column if modes is None else modes[step],
         np.concatenate([[0], ends]),
         kept.cost_kg[corner],
         kept.power_w[corner],

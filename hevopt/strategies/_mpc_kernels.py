@@ -8,8 +8,7 @@ from hevopt._compile import compiled
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices
-from hevopt.strategies._causal_kernels import State
+from hevopt.problem.choices import Choices, State
 
 
 class Hulls(NamedTuple):
@@ -150,6 +149,20 @@ def _merge(slope: Array, width: Array, edges: int, drain: Array, cost: Array) ->
 
 
 @compiled()
+def _taken(choices: Choices, path: Indices, start_mode: int) -> float:
+    """Stored energy that switching takes along entries, (step,)."""
+    first, switching = choices.first, choices.switching
+    total, mode = 0.0, start_mode
+    for k in range(len(path)):
+        n = 0
+        while path[k] >= first[k, n + 1]:
+            n += 1
+        total += switching.energy_j[switching.case[k], mode, n]
+        mode = n
+    return total
+
+
+@compiled()
 def best_mode_path(
     choices: Choices, drain: Array, start_mode: int, prices: Array, ahead: Ahead
 ) -> tuple[float, Indices]:
@@ -160,10 +173,11 @@ def best_mode_path(
     least_total, best = np.inf, np.zeros(len(choices.first), dtype=np.int64)
     for p in prices:
         priced = choices.cost_kg + p * drain
-        value, path, _ = shortest_path(choices, priced, start_mode)
+        before = np.full(len(choices.first), p)
+        value, path, _ = shortest_path(choices, priced, before, start_mode)
         if not np.isfinite(value):
             break
-        fall = np.sum(drain[path])
+        fall = np.sum(drain[path]) + _taken(choices, path, start_mode)
         x = charge - fall / unit
         total = value - p * fall + price * unit * (0.5 * gain * x * x - x)
         if total < least_total:
@@ -201,17 +215,18 @@ def nearest_choice(
 
     Only entries that lead within their mode's band (mode, 2) of stored energy; -1 where there is none.
     """
-    mode, energy = state
+    switching, case = choices.switching, choices.switching.case[k]
     least, chosen = np.inf, -1
-    _, voltage, discharge, charging = state_at(energy, battery)
     for n in modes:
+        energy = state.energy_j - switching.energy_j[case, state.mode, n]
+        _, voltage, discharge, charging = state_at(energy, battery)
         for i in range(choices.first[k, n], choices.first[k, n + 1]):
             drain = choices.step_s[k] * chemical_power(
                 choices.power_w[i], voltage, discharge, charging, battery.coulombic_efficiency
             )
             if not band[n, 0] <= energy - drain <= band[n, 1]:
                 continue
-            value = choices.cost_kg[i] + choices.switch_kg[mode, n] + aim.price_kgpj * drain
+            value = choices.cost_kg[i] + switching.kg[case, state.mode, n] + aim.price_kgpj * drain
             value += 0.5 * aim.curvature * (drain - aim.drain_j) ** 2
             if value < least:
                 least, chosen = value, i

@@ -2,7 +2,7 @@
 
 Variables for the n steps of the preview, energies in a common unit, e counted from the wanted charge:
     r_t  energy drawn, low_t <= r_t <= knee_t        s_t  brake slack, 0 <= s_t <= slack_t        e_t  after step t
-    min  sum [a_t r_t²/2 + b_t r_t] - e_n + g e_n²/2      s. t.   e_t - e_t-1 + r_t + s_t = 0
+    min  sum [a_t r_t²/2 + b_t r_t] - e_n + g e_n²/2      s. t.   e_t - e_t-1 + r_t + s_t = - (switching)_t
 The slack is drawn without saving anything: what the friction brakes take instead of the battery. Every step
 has one equality row, and bounds are rows of their own, so that only numbers change from step to step.
 The multiplier of row t is the price of stored energy after step t; at the end it is 1 - g e_n.
@@ -29,8 +29,8 @@ CLARABEL_SETTINGS = {"verbose": False, "max_iter": 200}
 class PreviewQp(Shown):
     """Numbers of one preview, in units of energy and price. curvature, slope, low, knee, slack: (step,)
 
-    start: charge before the first step; bottom, top: (step,) bounds on charge; gain: fall of the terminal price
-    per unit of charge
+    start: charge before the first step; switching: (step,) charge that it takes before each
+    bottom, top: (step,) bounds on charge; gain: fall of the terminal price per unit of charge
     """
 
     curvature: Array
@@ -39,6 +39,7 @@ class PreviewQp(Shown):
     knee: Array
     slack: Array
     start: float
+    switching: Array
     bottom: Array
     top: Array
     gain: float
@@ -95,7 +96,7 @@ def _vectors(qp: PreviewQp) -> tuple[Array, Array, Array, Array]:
     none, last = np.zeros(n), np.arange(n) == n - 1
     diagonal = np.concatenate([qp.curvature, none, qp.gain * last])
     q = np.concatenate([qp.slope, none, -1.0 * last])
-    balance = np.where(np.arange(n) == 0, qp.start, 0.0)
+    balance = np.where(np.arange(n) == 0, qp.start, 0.0) - qp.switching
     lower = np.concatenate([balance, qp.low, none, qp.bottom])
     upper = np.concatenate([balance, qp.knee, qp.slack, qp.top])
     return diagonal, q, lower, upper

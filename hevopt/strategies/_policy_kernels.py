@@ -8,6 +8,7 @@ from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices
+from hevopt.problem.switching import Switching
 from hevopt.strategies._causal_kernels import SteadyGrid
 
 
@@ -15,20 +16,21 @@ class Policy(NamedTuple):
     """What a policy does on representative rows.
 
     own, target: (row, mode led to, node) the choice's own cost, and where it leads, in cells
-    follow: (row, mode come from, node) mode gone to
+    follow, paid, between: (row, mode come from, node) mode gone to, cost of switching, and where it leads, in cells
     """
 
     own: Array
     target: Array
     follow: Indices
+    paid: Array
+    between: Array
 
 
 class Rows(NamedTuple):
-    """Class of representative rows and weight within it, (row,) each; (mode, mode) cost of switching."""
+    """Class of representative rows and weight within it, (row,) each."""
 
     row_class: Indices
     row_share: Array
-    switch_kg: Array
 
 
 @compiled()
@@ -50,14 +52,17 @@ def improve(
     rows, modes, nodes = first.shape[0], first.shape[1] - 1, ahead.shape[2]
     own = np.full((rows, modes, nodes), excess_kgpj * cell * nodes)
     target = np.zeros((rows, modes, nodes))
-    follow = np.zeros((rows, modes, nodes), dtype=np.int64)
-    least = np.empty(modes)
+    least = np.empty((modes, nodes))
+    policy = Policy(
+        own, target, np.zeros((rows, modes, nodes), dtype=np.int64), np.empty((rows, modes, nodes)),
+        np.empty((rows, modes, nodes)),
+    )  # fmt: skip
     for r in range(rows):
         for j in range(nodes):
             energy = low + cell * j
             _, voltage, discharge, charging = state_at(energy, battery)
             for n in range(modes):
-                least[n] = np.inf
+                least[n, j] = np.inf
                 for i in range(first[r, n], first[r, n + 1]):
                     rate = chemical_power(
                         power[i], voltage, discharge, charging, battery.coulombic_efficiency
@@ -68,22 +73,39 @@ def improve(
                     place = min(max(wanted, 0.0), nodes - 1.0)
                     paid = choices.cost_kg[i] + excess_kgpj * cell * abs(wanted - place)
                     total = paid + _between(ahead[row_class[r], n], place)
-                    if total < least[n]:
-                        least[n], own[r, n, j], target[r, n, j] = total, paid, place
-            for m in range(modes):
-                best = np.inf
-                for n in range(modes):
-                    total = choices.switch_kg[m, n] + least[n]
-                    if choices.switch_allowed[m, n] and total < best:
-                        best, follow[r, m, j] = total, n
-    return Policy(own, target, follow)
+                    if total < least[n, j]:
+                        least[n, j], own[r, n, j], target[r, n, j] = total, paid, place
+        _switch(choices.switching, r, least, cell, excess_kgpj, policy)
+    return policy
+
+
+@compiled()
+def _switch(
+    switching: Switching, r: int, least: Array, cell: float, excess_kgpj: float, policy: Policy
+) -> None:
+    """Fill the modes that a policy goes to at row r, from the least (mode, node) after switching."""
+    case, modes, nodes = switching.case[r], least.shape[0], least.shape[1]
+    for m in range(modes):
+        for j in range(nodes):
+            best = np.inf
+            policy.paid[r, m, j], policy.between[r, m, j] = switching.kg[case, m, 0], j
+            for n in range(modes):
+                if not switching.allowed[case, m, n]:
+                    continue
+                wanted = j - switching.energy_j[case, m, n] / cell
+                place = min(max(wanted, 0.0), nodes - 1.0)
+                paid = switching.kg[case, m, n] + excess_kgpj * cell * abs(wanted - place)
+                total = paid + _at(least[n], place)
+                if total < best:
+                    best, policy.follow[r, m, j] = total, n
+                    policy.paid[r, m, j], policy.between[r, m, j] = paid, place
 
 
 @compiled()
 def evaluate(policy: Policy, rows: Rows, stage_kg: Array, ahead: Array, value: Array) -> None:
     """Fill the value (class, mode, node) of one step of a policy, `stage_kg` (class, node) included."""
-    own, target, follow = policy
-    row_class, row_share, switch_kg = rows
+    own, target, follow, paid, between = policy
+    row_class, row_share = rows
     classes, modes, nodes = ahead.shape
     for z in range(classes):
         for m in range(modes):
@@ -93,8 +115,9 @@ def evaluate(policy: Policy, rows: Rows, stage_kg: Array, ahead: Array, value: A
         for m in range(modes):
             for j in range(nodes):
                 n = follow[r, m, j]
-                later = _between(ahead[z, n], target[r, n, j])
-                value[z, m, j] += share * (switch_kg[m, n] + own[r, n, j] + later)
+                place = between[r, m, j]
+                later = _between(ahead[z, n], _at(target[r, n], place))
+                value[z, m, j] += share * (paid[r, m, j] + _at(own[r, n], place) + later)
 
 
 @compiled()
@@ -119,6 +142,14 @@ def sweep(
         look_ahead(transition, value, ahead)
         evaluate(policy, rows, stage_kg, ahead, value)
         value -= value[0, 0, value.shape[2] // 2]
+    return value
+
+
+@compiled(inline="always")
+def _at(values: Array, place: float) -> float:
+    """At a place that is a node where switching takes no energy."""
+    j = int(place)
+    value: float = values[j] if j == place else _between(values, place)
     return value
 
 

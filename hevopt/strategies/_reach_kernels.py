@@ -11,10 +11,14 @@ from hevopt.problem.choices import Choices
 
 
 class Reach(NamedTuple):
-    """Stored energy, (time + 1, mode), between which the end can be reached; least > greatest: nowhere."""
+    """Stored energy, (time + 1, mode), between which the end can be reached; least > greatest: nowhere.
+
+    window_j: what it must keep to between switching and step
+    """
 
     least_j: Array
     greatest_j: Array
+    window_j: tuple[float, float]
 
 
 @compiled()
@@ -73,6 +77,7 @@ def reachable(
     """
     first, power, step_s = choices.first, choices.power_w, choices.step_s
     low, high = window
+    switching = choices.switching
     steps, modes = first.shape[0], first.shape[1] - 1
     least = np.full((steps + 1, modes), np.inf)
     greatest = np.full((steps + 1, modes), -np.inf)
@@ -80,6 +85,7 @@ def reachable(
     least[steps, :] = end_min
     greatest[steps, :] = high
     for k in range(steps - 1, -1, -1):
+        case = switching.case[k]
         for n in range(modes):
             bottom, top = least[k + 1, n], greatest[k + 1, n]
             if bottom > top:
@@ -104,7 +110,11 @@ def reachable(
                 lowest, highest = min(lowest, a), max(highest, b)
                 least_w, most_w = min(least_w, power[i]), max(most_w, power[i])
             for m in range(modes):
-                if choices.switch_allowed[m, n]:
-                    least[k, m] = min(least[k, m], lowest)
-                    greatest[k, m] = max(greatest[k, m], highest)
-    return Reach(least, greatest)
+                taken = switching.energy_j[case, m, n]
+                if not switching.allowed[case, m, n]:
+                    continue
+                if highest + taken < low - slack or lowest + taken > high + slack:
+                    continue
+                least[k, m] = min(least[k, m], max(lowest + taken, low))
+                greatest[k, m] = max(greatest[k, m], min(highest + taken, high))
+    return Reach(least, greatest, window)

@@ -106,15 +106,19 @@ def _advance(
 ) -> tuple[Array, Array]:
     """Least and greatest energy per mode after step k."""
     new_bottom, new_top = np.full_like(bottom, np.inf), np.full_like(top, -np.inf)
+    switching, (low, high) = choices.switching, problem.window_j
+    case = switching.case[k]
     for n in range(choices.modes):
         entries = slice(choices.first[k, n], choices.first[k, n + 1])
         power = choices.power_w[entries]
-        origins = np.flatnonzero(choices.switch_allowed[:, n] & np.isfinite(bottom))
-        if not len(power) or not len(origins):
+        taken_j = switching.energy_j[case, :, n]
+        floor, ceiling = np.maximum(bottom - taken_j, low), np.minimum(top - taken_j, high)
+        origins = switching.allowed[case, :, n] & np.isfinite(bottom) & (floor <= ceiling)
+        if not len(power) or not origins.any():
             continue
         for energy, pick in (
-            (bottom[origins].min(), power.max()),
-            (top[origins].max(), power.min()),
+            (floor[origins].min(), power.max()),
+            (ceiling[origins].max(), power.min()),
         ):
             drain = chemical_power_at(pick, energy, problem.battery.arrays)
             after = energy - choices.step_s[k] * drain

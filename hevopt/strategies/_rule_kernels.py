@@ -5,7 +5,7 @@ import numpy as np
 from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power_at
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.choices import Choices
+from hevopt.problem.choices import Choices, State
 
 
 @compiled()
@@ -49,21 +49,25 @@ def drive(
     wanted: Indices,
     fallback: Indices,
     choices: Choices,
-    start_j: float,
+    modes: Indices,
+    start: State,
     least_j: float,
     battery: BatteryArrays,
 ) -> tuple[Indices, Array]:
     """Entries (time,) that take `wanted` while more than least_j is stored and else `fallback`, and the energy.
 
     wanted, fallback: (time,) entries; they agree where there is nothing to choose.
+    modes: (entry,) that they lead to
     """
     power, step_s = choices.power_w, choices.step_s
-    steps = len(step_s)
+    _, _, switch_j, _ = choices.switching
+    steps, mode = len(step_s), start.mode
     entry = np.empty(steps, dtype=np.int64)
     energy = np.empty(steps + 1)
-    energy[0] = start_j
+    energy[0] = start.energy_j
     for k in range(steps):
         entry[k] = wanted[k] if energy[k] > least_j else fallback[k]
-        drain = chemical_power_at(power[entry[k]], energy[k], battery)
-        energy[k + 1] = energy[k] - step_s[k] * drain
+        between = energy[k] - switch_j[choices.switching.case[k], mode, modes[entry[k]]]
+        mode = modes[entry[k]]
+        energy[k + 1] = between - step_s[k] * chemical_power_at(power[entry[k]], between, battery)
     return entry, energy

@@ -19,9 +19,10 @@ from hevopt.bounds.prices import one_price_dual
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.choices import Choices, choices_of, require_choices
+from hevopt.problem.choices import Choices, State, choices_of, require_choices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
+from hevopt.problem.switching import switched
 from hevopt.strategies import _rule_kernels as kernels
 
 _CHARGE_LEVELS = 41
@@ -175,25 +176,23 @@ def _outcome(rules: Rules, engine: Indices, threshold_w: float) -> Outcome:
     wanted = np.where(electric, rules.electric, rest)
     low, high = problem.window_j
     level = low + _SOC_LEVEL_SHARE * (high - low)
+    start, modes = State(problem.start_mode, problem.start_j), problem.table.mode[choices.control]
     entry, energy = kernels.drive(
-        wanted, rest, choices, problem.start_j, level, problem.battery.arrays
+        wanted, rest, choices, modes, start, level, problem.battery.arrays
     )
     control = choices.control[entry]
     cost_kg, _ = total_cost_kg(problem, control)
+    switch = switched(problem.table, problem.start_mode, control)
+    stored = np.concatenate([energy, energy[:-1] - switch.energy_j])
     least_j, greatest_j = problem.battery.granted_window_j
     return Outcome(
         control,
         cost_kg,
         float(np.sum(problem.table.nox_kg[np.arange(choices.steps), control])),
         float(energy[-1]) - problem.end_min_j,
-        bool((energy >= least_j).all() and (energy <= greatest_j).all())
-        and bool(problem.table.switch_allowed[_modes(problem, control)].all()),
+        bool((stored >= least_j).all() and (stored <= greatest_j).all())
+        and bool(switch.allowed.all()),
     )
-
-
-def _modes(problem: Problem, control: Indices) -> tuple[Indices, Indices]:
-    mode = problem.table.mode[control]
-    return np.concatenate([[problem.start_mode], mode[:-1]]), mode
 
 
 def _next_true(flags: Flags, standing: Flags) -> Flags:

@@ -33,7 +33,7 @@ import numpy as np
 from hevopt.bounds.prices import drain_at_j
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags
-from hevopt.problem.choices import choices_of, require_choices, require_path
+from hevopt.problem.choices import State, choices_of, require_choices, require_path
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _causal_kernels as kernels
@@ -65,10 +65,11 @@ def solve(
     choices = choices_of(problem)
     require_choices(problem, choices, "a_ecms")
     view = kernels.View(drain_at_j(problem, choices, problem.start_j), *_speed_and_braking(problem))
-    share_kg = frozen("switching", settings.start_share * choices.switch_kg)
+    switching = choices.switching
+    share_kg = frozen("switching", settings.start_share * switching.kg)
     path, factor, recovered = kernels.adaptive(
-        choices._replace(switch_kg=share_kg), view,
-        kernels.State(problem.start_mode, problem.start_j), problem.end_min_j, problem.window_j,
+        choices._replace(switching=switching._replace(kg=share_kg)), view,
+        State(problem.start_mode, problem.start_j), problem.end_min_j, problem.window_j,
         settings, problem.battery.arrays,
     )  # fmt: skip
     require_path(problem, path, "a_ecms")

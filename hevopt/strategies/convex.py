@@ -3,7 +3,8 @@
 1. Relaxation: the convex model (_convex_model.py) with every mode open at every step and switching for nothing.
    Each plan of the table is a point of it (the share of its mode is 1, its battery loses no less) and costs there
    no more than it does; so its optimum is a bound on every plan. It is reported as the value of its dual, evaluated
-   afresh at the solver's multipliers (_convex_dual.py).
+   afresh at the solver's multipliers (_convex_dual.py). Where switching takes stored energy the model is none, for
+   it knows of no energy that switching gives back; its multipliers still are prices, and the dual counts switching.
 2. Mode path: with the multipliers p_t as prices and the falls of energy of the trajectory at hand, the shortest
    path over modes (Viterbi), switching costs included, gives engine on/off and gear. The prices are scaled to the
    top of the dual that this defines, so that the path takes about the energy that is there: a mode path chosen at
@@ -21,12 +22,20 @@
 import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.bounds.prices import drain_at_j, dual, one_price_dual, step_maxima
+from hevopt.bounds.prices import (
+    Priced,
+    before_steps,
+    drain_at_j,
+    dual,
+    one_price_dual,
+    step_maxima,
+)
 from hevopt.errors import InfeasibleError
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
+from hevopt.problem.switching import switched, switched_modes
 from hevopt.strategies._convex_model import SOLVER, Solution, optimum
 from hevopt.strategies._convex_parts import hulls_of
 from hevopt.strategies._reach_kernels import Reach
@@ -96,7 +105,9 @@ def solve(problem: Problem) -> Plan:
         seen.add(modes.tobytes())
         iterations += 1
         try:
-            solution = optimum(problem, hulls_of(search.choices, modes), guess)
+            hulls = hulls_of(search.choices, modes)
+            taken_j = switched_modes(problem.table, problem.start_mode, modes).energy_j
+            solution = optimum(problem, hulls, guess, taken_j)
         except InfeasibleError:
             continue
         value_kg = solution.value_kg + _switching_kg(problem, modes)
@@ -114,8 +125,7 @@ def solve(problem: Problem) -> Plan:
 
 
 def _switching_kg(problem: Problem, modes: Indices) -> float:
-    before = np.concatenate([[problem.start_mode], modes[:-1]])
-    return float(np.sum(problem.table.switch_fuel_kg[before, modes]))
+    return float(np.sum(switched_modes(problem.table, problem.start_mode, modes).kg))
 
 
 def _mode_path(
@@ -130,14 +140,17 @@ def _mode_path(
     excess_j = drain_j + choices.spread(np.diff(solution.energy_j))
     worth = choices.spread(solution.price_kgpj) * excess_j
     rounding = _WORTH_ROUNDING * float(np.sum(step_maxima(choices, np.abs(worth))))
+    before_kgpj = before_steps(solution.price_kgpj)
     try:
-        top = dual(problem, choices, worth, 0.0, 0.0, rounding)[-1].scale
+        top = dual(problem, choices, Priced(worth, before_kgpj, 0.0, 0.0, rounding))[-1].scale
     except InfeasibleError:
         top = 1.0
     found = []
     for scale in (top * (1 - _BESIDE_TOP), top * (1 + _BESIDE_TOP)):
         priced = choices.cost_kg + scale * worth
-        _, path, to_go = shortest_path(choices, priced, problem.start_mode)
-        found.append((abs(float(np.sum(worth[path]))), scale, path, to_go))
+        _, path, to_go = shortest_path(choices, priced, scale * before_kgpj, problem.start_mode)
+        taken_j = switched(problem.table, problem.start_mode, choices.control[path]).energy_j
+        away_kg = float(np.sum(worth[path])) + float(np.sum(before_kgpj * taken_j))
+        found.append((abs(away_kg), scale, path, to_go))
     _, scale, path, to_go = min(found, key=lambda item: item[:2])
     return problem.table.mode[choices.control[path]], scale * solution.price_kgpj, to_go

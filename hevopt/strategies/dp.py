@@ -1,6 +1,7 @@
 """Dynamic programming on stored energy and mode, rolled out with the true battery.
 
-    V_t(m, E) = min over u of  cost_t(u) + switching(m, mode(u)) + V_t+1(mode(u), E - r_t(u, E))
+    V_t(m, E) = min over n of  K_t(m, n) + W_t(n, E - s_t(m, n))       K, s: fuel and stored energy of switching
+    W_t(n, E) = min over u leading to n of  cost_t(u) + V_t+1(n, E - r_t(u, E))
 
 The value function is tabulated over a grid of stored energy and interpolated linearly; it only guides the
 rollout, whose path is exact, stays within the window and ends with at least the charge that is asked. Outside
@@ -22,10 +23,11 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, without_dominated
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
-from hevopt.strategies import _rollout_kernels as kernels
+from hevopt.problem.switching import switched
+from hevopt.strategies._backward_kernels import Penalty, backward
 from hevopt.strategies._reach_kernels import Reach
 from hevopt.strategies._rollout import follow, reach_of
-from hevopt.strategies._rollout_kernels import Grid, Penalty
+from hevopt.strategies._rollout_kernels import Grid
 from hevopt.strategies._value_blocks import ValueBlocks
 
 ENERGY_NODES = 1001
@@ -78,16 +80,19 @@ def _search(
     problem, choices = setting.problem, setting.every
     low, high = problem.window_j
     centre = np.full(choices.steps + 1, (low + high) / 2)
+    switch_j = np.zeros(choices.steps)
     best_cost, best, promises = np.inf, np.empty(0, np.int64), list[float]()
     for band in bands:
         cell = band * (high - low) / (nodes - 1)
         grid = _grid_around(problem, centre, cell, nodes)
-        path, promise = _solve_on_grid(setting, grid, nodes)
+        between = _grid_around(problem, centre[:-1] - switch_j, cell, nodes).low_j
+        path, promise = _solve_on_grid(setting, grid, between, nodes)
         promises.append(promise)
         cost, energy_j = total_cost_kg(problem, choices.control[path])
         settled = best_cost - cost < _GAIN_WORTH_MORE * abs(cost) and len(promises) > 2
         if cost < best_cost:
             best_cost, best, centre = cost, choices.control[path], energy_j
+            switch_j = switched(problem.table, problem.start_mode, best).energy_j
         if settled:
             break
     return best_cost, best, promises[0]
@@ -101,8 +106,13 @@ def _grid_around(problem: Problem, centre_j: Array, cell_j: float, nodes: int) -
     return Grid(problem.end_min_j - cell_j * below, cell_j)
 
 
-def _solve_on_grid(setting: _Setting, grid: Grid, nodes: int) -> tuple[Indices, float]:
-    """Entries (time,) of the rollout on one grid, and the cost its value function promised."""
+def _solve_on_grid(
+    setting: _Setting, grid: Grid, between_j: Array, nodes: int
+) -> tuple[Indices, float]:
+    """Entries (time,) of the rollout on one grid, and the cost its value function promised.
+
+    between_j: (time,) bottom of the grid between switching and step
+    """
     problem, choices = setting.problem, setting.choices
     last_grid = grid.low_j[-1] + grid.cell_j * np.arange(nodes)
     terminal = setting.penalty_kgpj * np.maximum(problem.end_min_j - last_grid, 0.0)
@@ -111,11 +121,13 @@ def _solve_on_grid(setting: _Setting, grid: Grid, nodes: int) -> tuple[Indices, 
     penalty = Penalty(per_cell, ceiling, _unreachable_kg(choices, terminal))
     battery = problem.battery.arrays
 
-    def backward(begin: int, end: int, after: Array) -> Array:
+    def block(begin: int, end: int, after: Array) -> Array:
         part = Grid(grid.low_j[begin : end + 1], grid.cell_j)
-        return kernels.backward(choices.part(begin, end), after, part, penalty, battery)
+        return backward(
+            choices.part(begin, end), after, part, between_j[begin:end], penalty, battery
+        )
 
-    values = ValueBlocks(choices.steps, np.tile(terminal, (choices.modes, 1)), backward)
+    values = ValueBlocks(choices.steps, np.tile(terminal, (choices.modes, 1)), block)
     first_grid = grid.low_j[0] + grid.cell_j * np.arange(nodes)
     at_start = values.block_of(0)[1][0, problem.start_mode]
     promised = float(np.interp(problem.start_j, first_grid, at_start))
@@ -125,5 +137,5 @@ def _solve_on_grid(setting: _Setting, grid: Grid, nodes: int) -> tuple[Indices, 
 
 def _unreachable_kg(choices: Choices, terminal_kg: Array) -> float:
     """More than any path can cost, computed from the problem itself."""
-    worst_step = float(choices.cost_kg.max(initial=0.0)) + float(choices.switch_kg.max())
+    worst_step = float(choices.cost_kg.max(initial=0.0)) + float(choices.switching.kg.max())
     return worst_step * choices.steps + 2.0 * float(terminal_kg.max()) + 1e-3

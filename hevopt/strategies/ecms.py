@@ -13,7 +13,7 @@ ends with at least the asked charge is taken.
 import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.bounds.prices import drain_at_j, one_price_dual, typical_price_kgpj
+from hevopt.bounds.prices import before_steps, drain_at_j, one_price_dual, typical_price_kgpj
 from hevopt.problem.arrays import Array
 from hevopt.problem.choices import choices_of
 from hevopt.problem.problem import Plan, Problem
@@ -46,7 +46,8 @@ class _Search:
         low, high = self.problem.window_j
         choices = self.choices
         priced = choices.cost_kg + choices.spread(price_kgpj) * self.drain_j
-        _, _, to_go = shortest_path(choices, priced, self.problem.start_mode)
+        before_kgpj = before_steps(price_kgpj)
+        _, _, to_go = shortest_path(choices, priced, before_kgpj, self.problem.start_mode)
         # A mode without a way on is never entered: the reach is empty there.
         to_go = np.where(np.isfinite(to_go), to_go, 0.0)
         of_step = np.concatenate([price_kgpj[:1], price_kgpj])[:, None, None]

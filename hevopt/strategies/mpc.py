@@ -24,10 +24,9 @@ import numpy as np
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem._battery_kernels import chemical_power_at
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices
+from hevopt.problem.choices import Choices, State
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _mpc_kernels as kernels
-from hevopt.strategies._causal_kernels import State
 from hevopt.strategies._mpc_model import Model, model_of
 from hevopt.strategies._mpc_qp import HorizonSolver, PreviewQp
 from hevopt.strategies._reach_kernels import reachable
@@ -77,11 +76,19 @@ class Controller:
         entry = self._entry(k, int(modes[0]), float(target_j[0]), float(price_kgpj[0]))
         self.last_price_kgpj = float(price_kgpj[-1])
         choices = self.model.choices
-        self.mode = int(self.problem.table.mode[choices.control[entry]])
+        mode = int(self.problem.table.mode[choices.control[entry]])
+        self.energy_j -= self._taken_j(k, np.array([self.mode]), np.array([mode]))[0]
+        self.mode = mode
         self.energy_j -= choices.step_s[k] * chemical_power_at(
             choices.power_w[entry], self.energy_j, self.problem.battery.arrays
         )
         return entry
+
+    def _taken_j(self, k: int, before: Indices, modes: Indices) -> Array:
+        """Stored energy that switching takes, (step,) from step k on."""
+        case, _, energy_j, _ = self.model.choices.switching
+        taken_j: Array = energy_j[case[k : k + len(modes)], before, modes]
+        return taken_j
 
     def _charge(self, k: int) -> float:
         """Stored energy above the wanted, in units."""
@@ -113,7 +120,10 @@ class Controller:
         unit, price, wanted_j = self.unit_j, self.model.price_kgpj[k], self.model.wanted_j[k]
         steps = np.arange(k, self.model.end[k])
         low, knee, greatest, curvature, slope = self.model.fit[steps, modes].T
-        bottom, top = kernels.reachable_band(self.energy_j, low, greatest, self.problem.window_j)
+        taken = self._taken_j(k, np.concatenate([[self.mode], modes[:-1]]), modes)
+        bottom, top = kernels.reachable_band(
+            self.energy_j, low + taken, greatest + taken, self.problem.window_j
+        )
         qp = PreviewQp(
             curvature=np.maximum(curvature * unit / price, _LEAST_CURVATURE),
             slope=slope / price,
@@ -121,6 +131,7 @@ class Controller:
             knee=knee / unit,
             slack=(greatest - knee) / unit,
             start=self._charge(k),
+            switching=taken / unit,
             bottom=(bottom - wanted_j) / unit,
             top=(top - wanted_j) / unit,
             gain=GAIN / _UNITS_PER_WINDOW,
@@ -132,7 +143,8 @@ class Controller:
         """The choice of step 4 above; of another mode, or safe for one step only, where there is no other."""
         least_curvature = _LEAST_CURVATURE * self.model.price_kgpj[k] / self.unit_j
         curvature = max(float(self.model.fit[k, mode, 3]), least_curvature)
-        allowed = np.flatnonzero(self.model.choices.switch_allowed[self.mode])
+        switching = self.model.choices.switching
+        allowed = np.flatnonzero(switching.allowed[switching.case[k], self.mode])
         slack = _ENERGY_ROUNDING * self.problem.window_j[1] * np.array([-1.0, 1.0])
         window = np.array([self.problem.window_j] * self.model.choices.modes)
         state, aim = State(self.mode, self.energy_j), kernels.Aim(price_kgpj, target_j, curvature)

@@ -32,6 +32,7 @@ from hevopt.problem import battery as battery_model
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import (
     Choices,
+    State,
     choices_of,
     require_choices,
     require_path,
@@ -39,6 +40,7 @@ from hevopt.problem.choices import (
 )
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.switching import joined_switching
 from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import _policy_kernels as policies
@@ -96,7 +98,7 @@ def solve(
     require_choices(problem, every, "sdp")
     path = kernels.follow_map(
         every, classes_of(chain, _signals(problem)), ahead,
-        kernels.State(problem.start_mode, problem.start_j), _grid(problem, nodes),
+        State(problem.start_mode, problem.start_j), _grid(problem, nodes),
         problem.battery.arrays,
     )  # fmt: skip
     require_path(problem, path, "sdp")
@@ -162,7 +164,7 @@ def _policy_map(
     grid, half = _grid(problem, nodes), (high - low) / 2
     rows = _joined_rows(training, chain.rows)
     level = low + grid.cell_j * np.arange(nodes)
-    listed = policies.Rows(chain.row_class, chain.row_share, rows.switch_kg)
+    listed = policies.Rows(chain.row_class, chain.row_share)
     missing = (problem.end_min_j - recovered * chain.speed_mps[:, None] ** 2 - level) / half
     step_s = float(rows.step_s[0])
     stage = price * half / memory_s * step_s * missing**2
@@ -206,7 +208,9 @@ def _stacked(parts: list[Choices]) -> Choices:
     }
     first = np.concatenate([part.first + end for part, end in zip(parts, ends[:-1], strict=True)])
     joined["step_s"] = frozen("step_s", joined["step_s"])
-    return parts[0]._replace(first=first, **joined)
+    return parts[0]._replace(
+        first=first, switching=joined_switching([part.switching for part in parts]), **joined
+    )
 
 
 def _some_rows(choices: Choices, rows: Indices) -> Choices:
@@ -221,6 +225,7 @@ def _some_rows(choices: Choices, rows: Indices) -> Choices:
         cost_kg=choices.cost_kg[entry],
         power_w=choices.power_w[entry],
         step_s=frozen("step_s", choices.step_s[rows]),
+        switching=choices.switching._replace(case=choices.switching.case[rows]),
     )
 
 
@@ -247,15 +252,22 @@ def _signals(problem: Problem) -> Signals:
     return problem.table.signals
 
 
+def _same_at_every_step(problem: Problem) -> list[Array]:
+    """What switching takes, as far as it does not depend on the step."""
+    table = problem.table
+    return [part for part in (table.switch_fuel_kg, table.switch_energy_j) if part.ndim == 2]
+
+
 def _check(problem: Problem, training: Sequence[Problem]) -> None:
     if not training:
         raise DataError(
             "sdp: no training; pass problems of the same car on other cycles than the one driven"
         )
-    step_s, switch_kg = problem.table.step_s[0], problem.table.switch_fuel_kg
+    step_s, switching = problem.table.step_s[0], _same_at_every_step(problem)
     for n, other in enumerate(training):
         which = f"sdp: training problem {n} has"
-        if not np.array_equal(other.table.switch_fuel_kg, switch_kg):
+        same = map(np.array_equal, switching, _same_at_every_step(other))
+        if other.table.modes != problem.table.modes or not all(same):
             raise DataError(f"{which} other modes or switching; pass problems of the same car")
         if not np.allclose(other.table.step_s, step_s, rtol=1e-6):
             raise DataError(f"{which} steps of another length; allowed: {step_s:g} s throughout")

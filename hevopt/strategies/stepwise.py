@@ -10,6 +10,7 @@ from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import trace
 from hevopt.problem.problem import Plan, Problem
+from hevopt.problem.switching import at_step
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,8 @@ class Step(NamedTuple):
     k: its number; time_s: when it begins; step_s: how long it is
     soc, energy_j: state of charge and stored energy; mode: what the last control left
     usable: (control,) whether it can be taken here: not rejected, its switch allowed, the charge kept in its window
-    fuel_kg, nox_kg: (control,) in this step, switch_fuel_kg: (control,) for the switch that leads there
+    fuel_kg, nox_kg: (control,) in this step
+    switch_fuel_kg, switch_energy_j: (control,) for the switch that leads there; the energy is taken before the step
     battery_power_w: (control,) at the terminals, > 0 discharges; engine_on: (control,)
     speed_mps, wheel_power_w, gear: of the car; NaN, NaN and 0 where the table has no signals
     """
@@ -35,6 +37,7 @@ class Step(NamedTuple):
     fuel_kg: Array
     nox_kg: Array
     switch_fuel_kg: Array
+    switch_energy_j: Array
     battery_power_w: Array
     engine_on: NDArray[np.bool_]
     speed_mps: float
@@ -61,8 +64,9 @@ def stepwise(problem: Problem, decide: Callable[[Step], int]) -> Plan:
             )
         control[k] = _checked(now, decide(now))
         mode = int(table.mode[control[k]])
-        power_w = table.battery_power_w[k, control[k]]
-        energy_j = float(trace(energy_j, np.array([power_w]), table.step_s[k : k + 1], arrays)[-1])
+        taken_j, power_w = now.switch_energy_j[control[k]], table.battery_power_w[k, control[k]]
+        one = np.array([taken_j]), np.array([power_w]), table.step_s[k : k + 1]
+        energy_j = float(trace(energy_j, *one, arrays)[-1])
     return Plan(control)
 
 
@@ -75,28 +79,36 @@ def _step(
     engine_on: NDArray[np.bool_],
 ) -> Step:
     table, pack = problem.table, problem.battery
-    soc, voltage, discharge, charge = battery_model.states(pack, energy_j)
+    switch_kg, switch_j, allowed = (
+        at_step(part, k)[mode, table.mode]
+        for part in (table.switch_fuel_kg, table.switch_energy_j, table.switch_allowed)
+    )
+    between_j = energy_j - switch_j
+    _, voltage, discharge, charge = battery_model.states(pack, between_j)
     power_w = table.battery_power_w[k]
     chemical_w = battery_model.chemical_power_w(
         pack, power_w, voltage, np.where(power_w < 0, charge, discharge)
     )
-    after_j = energy_j - table.step_s[k] * chemical_w
+    after_j = between_j - table.step_s[k] * chemical_w
     signals = table.signals
     return Step(
         k=k,
         time_s=float(table.time_s[k]),
         step_s=float(table.step_s[k]),
-        soc=float(soc),
+        soc=float(battery_model.soc(pack, energy_j)),
         energy_j=energy_j,
         mode=mode,
         # NaN, a power beyond what the voltage delivers, is outside.
         usable=table.feasible[k]
-        & table.switch_allowed[mode, table.mode]
+        & allowed
+        & (between_j >= window_j[0])
+        & (between_j <= window_j[1])
         & (after_j >= window_j[0])
         & (after_j <= window_j[1]),
         fuel_kg=table.fuel_kg[k],
         nox_kg=table.nox_kg[k],
-        switch_fuel_kg=table.switch_fuel_kg[mode, table.mode],
+        switch_fuel_kg=switch_kg,
+        switch_energy_j=switch_j,
         battery_power_w=power_w,
         engine_on=engine_on,
         speed_mps=np.nan if signals is None else float(signals.speed_mps[k]),

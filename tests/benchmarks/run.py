@@ -35,8 +35,9 @@ from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.driving.demand import demand_of
 from hevopt.powertrain.powertrain import build_table
 from hevopt.problem.choices import choices_of, without_dominated
-from hevopt.strategies import _rollout_kernels as kernels
+from hevopt.strategies import _backward_kernels as kernels
 from hevopt.strategies import dp, ecms
+from hevopt.strategies._rollout_kernels import Grid
 
 OUT = Path(__file__).parents[2] / "reports" / "benchmarks.md"
 HYBRIDS = ("C1", "C2", "D", "E")
@@ -58,13 +59,15 @@ def backward_call(problem: Problem, nodes: int) -> tuple[Callable[[], object], i
     choices = without_dominated(choices_of(problem))
     low, high = problem.window_j
     cell = (high - low) / (nodes - 1)
-    grid = kernels.Grid(np.full(choices.steps + 1, low), cell)
+    grid = Grid(np.full(choices.steps + 1, low), cell)
     terminal = 1e-7 * np.maximum(problem.end_min_j - low - cell * np.arange(nodes), 0.0)
 
     def call() -> object:
         after = np.tile(terminal, (choices.modes, 1))
         penalty = kernels.Penalty(1e-7 * cell, 0.0, 1.0)
-        return kernels.backward(choices, after, grid, penalty, problem.battery.arrays)
+        return kernels.backward(
+            choices, after, grid, grid.low_j[:-1], penalty, problem.battery.arrays
+        )
 
     return call, len(choices.cost_kg) * nodes
 

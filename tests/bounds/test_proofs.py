@@ -31,8 +31,9 @@ from hevopt import (
 )
 from hevopt.bounds import certificate as certificate_module
 from hevopt.bounds import step_prices
+from hevopt.bounds.lines import Line
 from hevopt.bounds.lower_dp import lower_bound_kg
-from hevopt.bounds.prices import Line, one_price_dual
+from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual, line_above
 from hevopt.problem.battery import within_limits
 from hevopt.problem.table import Signals

@@ -11,7 +11,7 @@ from hevopt.car.engine_laws import EngineMap
 from hevopt.car.machine_laws import LossMap
 from hevopt.driving.cycle import Cycle
 from hevopt.pages.comparison.maps import engine_map
-from hevopt.problem.table import Reject
+from hevopt.problem.reject import Reject
 
 RPM = np.pi / 30
 TORQUE = np.arange(-60, 281, 10.0)

@@ -11,7 +11,7 @@ from hevopt import DataError, build_problem, load_architecture, load_cycle, simu
 from hevopt.car.grid import highest_known, interpolated
 from hevopt.car.machine_laws import LossMap
 from hevopt.files.lookup import shipped_folder
-from hevopt.problem.table import Reject
+from hevopt.problem.reject import Reject
 
 SHIPPED = shipped_folder("architectures")
 SPEED = np.linspace(0, 650, 27)

@@ -9,7 +9,8 @@ import pytest
 from problems import random_problem
 
 from hevopt import Battery, ControlTable, DataError, InfeasibleError, Problem, simulate
-from hevopt.problem.table import Reject, Signals
+from hevopt.problem.reject import Reject
+from hevopt.problem.table import Signals
 
 FUEL = np.array([[1e-4, 2e-4], [1e-4, 2e-4], [1e-4, 2e-4]])
 POWER = np.array([[500.0, -500.0]] * 3)
@@ -84,7 +85,7 @@ def test_a_view_taken_before_does_not_write_to_the_table():
 def test_nothing_in_a_table_can_be_changed(made):
     table = made(ControlTable(**given_arrays()))
     arrays = arrays_of(table)
-    assert len(arrays) == 15
+    assert len(arrays) == 16
     for name, values in arrays.items():
         with pytest.raises(ValueError, match="read-only"):
             values[...] = 0

@@ -11,7 +11,7 @@ from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import end_slack_j, one_price_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.problem.problem import Problem
-from hevopt.problem.table import Reject
+from hevopt.problem.reject import Reject
 from hevopt.strategies import a_ecms, convex, dp, ecms, mpc
 
 EPSILON = float(np.finfo(float).eps)

@@ -3,8 +3,11 @@
 Window ends that are points of the curves with a steep rise beyond; curves bent inside the window, up or down;
 flat ones; resistances that rise or fall with charge, or are 0; limits of power and current that bite; powers at
 the voltage's peak; scales of cost, voltage and energy over many orders; ties, costs of 0 and below, switches that
-are dear, forbidden or free, several modes, steps that move a good part of the window or hundreds of them.
+are dear, forbidden or free, several modes, steps that move a good part of the window or hundreds of them. Switches
+that take stored energy or give it back, from nothing to more than the window, alike at every step or not.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,12 +27,31 @@ def draw(seed: int) -> Problem:
         step_s = np.full(steps, step_s[0])
     battery = _battery(rng, power_w, float(step_s.mean()), tied)
     table = _table(rng, battery, step_s, count, modes, power_w, tied)
+    table = _with_switching(np.random.default_rng([12, seed]), table, power_w)
     low, high = battery.soc_min, battery.soc_max
     start = float(rng.choice([low, high, rng.uniform(low, high)], p=[0.1, 0.1, 0.8]))
     end = start + (high - low) * float(rng.choice([0.0, rng.uniform(-0.4, 0.2)]))
     start_mode = int(rng.integers(0, modes))
     weight = float(rng.choice([0.0, 0.0, 5.0]))
     return Problem(table, battery, start, min(max(end, low), high), start_mode, weight)
+
+
+def _with_switching(rng, table, power_w) -> ControlTable:
+    """Energy of switching in half of the problems, figures that depend on the step in some."""
+    whole = len(table.step_s), table.modes, table.modes
+    energy = rng.uniform(-1, 1, whole if rng.random() < 0.5 else whole[1:])
+    if rng.random() < 0.2:
+        energy = np.round(energy)
+    if rng.random() < 0.9:
+        energy = energy * (1 - np.eye(table.modes))
+    share = float(rng.choice([0.0, 0.01, 0.3, 1.0, 5.0], p=[0.5, 0.1, 0.2, 0.15, 0.05]))
+    parts = {"switch_energy_j": energy * share * power_w * float(table.step_s.mean())}
+    if rng.random() < 0.2:
+        parts["switch_fuel_kg"] = table.switch_fuel_kg * rng.uniform(0, 2, whole)
+    if rng.random() < 0.1:
+        forbidden = (rng.random(whole) < 0.2) & ~np.eye(table.modes, dtype=bool)
+        parts["switch_allowed"] = table.switch_allowed & ~forbidden
+    return replace(table, **parts)
 
 
 def _battery(rng, power_w, step_s, tied) -> Battery:

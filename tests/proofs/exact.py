@@ -109,10 +109,15 @@ class Limits:
         return True
 
 
+def _of(switching, k, before, mode):
+    """What a switch counts at step k, of one matrix for all steps or one for each."""
+    return switching[before, mode] if switching.ndim == 2 else switching[k, before, mode]
+
+
 def every_plan(problem):
     """(cost, stored energy at the end, furthest outside the window) of every plan that simulate may accept.
 
-    A plan that keeps inside is outside by less than 0.
+    Switching takes its energy before the step. A plan that keeps inside is outside by less than 0.
     """
     table, pack = problem.table, Pack(problem.battery)
     low, high = pack.energy(problem.battery.soc_min), pack.energy(problem.battery.soc_max)
@@ -132,12 +137,16 @@ def every_plan(problem):
         following = []
         for cost, energy, mode, out in plans:
             for own, power, to in controls:
-                if not table.switch_allowed[mode, to]:
+                if not _of(table.switch_allowed, k, mode, to):
                     continue
-                left = pack.after(energy, power, step_s)
+                between = energy - float(_of(table.switch_energy_j, k, mode, to))
+                if not low - slack <= between <= high + slack:
+                    continue
+                left = pack.after(between, power, step_s)
                 if left is None or not low - slack <= left <= high + slack:
                     continue
-                total = cost + own + float(table.switch_fuel_kg[mode, to])
-                following.append((total, left, to, max(out, low - left, left - high)))
+                total = cost + own + float(_of(table.switch_fuel_kg, k, mode, to))
+                ends = low - between, between - high, low - left, left - high
+                following.append((total, left, to, max(out, *ends)))
         plans = following
     return [(cost, energy, out) for cost, energy, _, out in plans]

@@ -11,8 +11,9 @@ from problems import random_problem
 from hevopt import Battery, Control, ControlTable, InfeasibleError, Problem, certify, simulate
 from hevopt.problem._battery_kernels import chemical_power_at
 from hevopt.problem.choices import choices_of
-from hevopt.strategies import _rollout_kernels as kernels
+from hevopt.strategies import _backward_kernels as kernels
 from hevopt.strategies import dp, ecms
+from hevopt.strategies._rollout_kernels import Grid
 
 
 def plain_backward(
@@ -39,7 +40,9 @@ def plain_backward(
                 total += ceiling_kg * np.maximum(place - nodes[-1], 0)
                 least[m] = np.minimum(least[m], total)
         cost = np.where(
-            choices.switch_allowed[:, :, None], choices.switch_kg[:, :, None] + least, np.inf
+            choices.switching.allowed[0][:, :, None],
+            choices.switching.kg[0][:, :, None] + least,
+            np.inf,
         )
         value[k] = np.minimum(cost.min(axis=1), unreachable_kg)
     return value
@@ -68,7 +71,7 @@ def compare_with_twin(problem, ceiling, pieces, tolerance):
     cell = 0.9 * (high - low) / 200
     terminal = 1e-7 * np.maximum(problem.end_min_j - grid_low[-1] - cell * np.arange(201), 0)
     fast = kernels.backward(
-        choices, np.tile(terminal, (choices.modes, 1)), kernels.Grid(grid_low, cell),
+        choices, np.tile(terminal, (choices.modes, 1)), Grid(grid_low, cell), grid_low[:-1],
         kernels.Penalty(1e-4, ceiling, 1.0), pack.arrays,
     )  # fmt: skip
     plain = plain_backward(choices, terminal, grid_low, cell, 1e-4, ceiling, 1.0, pack, pieces)

@@ -114,7 +114,8 @@ def preview_qp(steps: int, **changed) -> _mpc_qp.PreviewQp:
     every = np.ones(steps)
     numbers = {
         "curvature": 0.1 * every, "slope": -0.9 * every, "low": -every, "knee": every,
-        "slack": 0 * every, "start": 2.0, "bottom": -50 * every, "top": 50 * every, "gain": 0.02,
+        "slack": 0 * every, "start": 2.0, "switching": 0 * every,
+        "bottom": -50 * every, "top": 50 * every, "gain": 0.02,
     }  # fmt: skip
     return _mpc_qp.PreviewQp(**(numbers | changed))
 

@@ -118,7 +118,7 @@ def test_kernels_agree_with_a_plain_twin(problem_of):
         joined, chain.row_class, ahead, kernels.SteadyGrid(low, cell), 1e-6, problem.battery.arrays
     )
     value = np.empty_like(ahead)
-    listed = policies.Rows(chain.row_class, chain.row_share, joined.switch_kg)
+    listed = policies.Rows(chain.row_class, chain.row_share)
     policies.evaluate(policy, listed, np.zeros((classes, nodes)), ahead, value)
     np.testing.assert_allclose(
         value[3], plain_value(problem, chain, joined, ahead, 3), rtol=1e-9, atol=1e-15
@@ -145,7 +145,7 @@ def plain_value(problem, chain, joined, ahead, z):
                 inside = np.clip(wanted, low, high)
                 total = joined.cost_kg[i] + 1e-6 * np.abs(wanted - inside)
                 least[n] = np.minimum(least[n], total + np.interp(inside, grid, ahead[z, n]))
-        value += (joined.switch_kg[:, :, None] + least).min(axis=1) / len(members)
+        value += (joined.switching.kg[0][:, :, None] + least).min(axis=1) / len(members)
     return value
 
 
