@@ -31,6 +31,7 @@ import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.bounds.lines import Line, maximise
+from hevopt.display.facts import Shown
 from hevopt.errors import InfeasibleError
 from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
@@ -149,8 +150,8 @@ def step_maxima(choices: Choices, figure: Array) -> Array:
     return greatest
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Priced:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Priced(Shown):
     """The priced part of a dual, all at scale 1.
 
     worth: (entry,) of each choice; before: (time,) price of stored energy that switching takes before each step

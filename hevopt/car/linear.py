@@ -10,14 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
+
 Coefficient = float | NDArray[np.float64]
 Terms = dict[str, Coefficient]
 # Ratios are between 0.01 and 50; a coefficient below this is what rounding leaves of nothing.
 _NOTHING = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+@dataclass(frozen=True, slots=True, repr=False)
+class Row(Shown):
     """One equation, by name: left x unknowns = right x inputs."""
 
     name: str

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.linear import Coefficient
+from hevopt.display.facts import Shown
 
 WHEEL = "wheel"
 Loss = Literal["clutch", "gearbox", "gear"]
@@ -30,8 +31,8 @@ Loss = Literal["clutch", "gearbox", "gear"]
 GearChoice = Literal["listed", "free", "preselected"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Joint:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Joint(Shown):
     """A part in one of its states.
 
     speed: shaft -> coefficient of its speed row; empty where it ties no speeds

@@ -8,6 +8,7 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import BRAKE, ENGINE, State
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.levels import Around, labels, levels_of
 from hevopt.powertrain.operation import Setting, completed, flowing, setting
@@ -20,8 +21,8 @@ from hevopt.problem.reject import Reject
 _ROUNDING_W = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Piece:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Piece(Shown):
     """The steps at which a branch drives in one way, and the torques given there, (state, level) by actuator."""
 
     here: Setting
@@ -36,8 +37,8 @@ class Driven(NamedTuple):
     pieces: tuple[Piece, ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Branch:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Branch(Shown):
     """All controls of one state; arrays (time, level)."""
 
     driven: Driven

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hevopt.car.driveline import ENGINE, State
+from hevopt.display.facts import Shown
 from hevopt.powertrain.operation import Setting
 from hevopt.problem.arrays import Array, Flags, Indices
 
@@ -21,8 +22,8 @@ _ADDED_PLACES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 _SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency", "fuel cut")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Around:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Around(Shown):
     """Where to add torques: close to those of a plan.
 
     torque_nm: state -> (time,) torque of the plan, NaN where it drives in another state
@@ -41,8 +42,8 @@ class Around:
         return np.where(np.isnan(added), low, np.clip(added, low, high))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Levels:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Levels(Shown):
     """Torques given, (state, level) by actuator; repeats: levels that are there already, (state, level)."""
 
     given: Mapping[str, Array]

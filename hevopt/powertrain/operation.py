@@ -10,13 +10,14 @@ from hevopt.car.balance import joints_of
 from hevopt.car.driveline import BRAKE, ENGINE
 from hevopt.car.machine import Machine
 from hevopt.car.ways import Way
+from hevopt.display.facts import Shown
 from hevopt.powertrain.shafts import Shafts
 from hevopt.powertrain.torques import Torques
 from hevopt.problem.arrays import Array, Flags, Indices
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Setting:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Setting(Shown):
     """A way at its states, (state,), before any torque is chosen.
 
     least_nm: lowest torque that the engine may have: drag where the wheels turn it (fuel cut), else 0, as it keeps
@@ -113,8 +114,8 @@ def _rows(torque: Array, state: Indices) -> Array:
     return torque if len(torque) == 1 else torque[state]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Flowing:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Flowing(Shown):
     """What torques burn and draw: fuel and NOx flow, and electric power of each machine by name.
 
     Arrays are (state, level), or (state, 1) or (1, 1) where all levels, or states, have one.

@@ -17,14 +17,15 @@ from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import Phase, State
 from hevopt.car.parts import Gear
 from hevopt.car.ways import Way, way
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.driving.driver import launch_speed_radps
 from hevopt.powertrain.shafts import Shafts, shafts_of
 from hevopt.problem.arrays import Array, Flags, Indices
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Driver:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Driver(Shown):
     """What demand and driver make of the steps, whatever the strategy chooses.
 
     launch_radps: (time,) engine speed at which the clutch closes

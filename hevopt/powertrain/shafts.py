@@ -10,12 +10,13 @@ from hevopt.car.balance import speeds_of
 from hevopt.car.linear import Coefficient, Terms
 from hevopt.car.parts import WHEEL
 from hevopt.car.ways import Way
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.problem.arrays import Array, Indices
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Shafts:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Shafts(Shown):
     """Speeds at the steps of a way; every array (state,), a state being a step, or one of its speeds to choose.
 
     step, gear: index and listed gear of each state's step; wheel_nm: torque that the wheels ask for
