@@ -69,7 +69,7 @@ def dual() -> Figure:
     axes.plot(top.scale * 3.6e9, top.value_kg * 1e3, "o", color=_BLUE, label="best bound")
     axes.set_ylim(0.97 * top.value_kg * 1e3, 1.01 * plan_kg * 1e3)
     axes.set(xlabel="price λ of stored energy, g/kWh", ylabel="fuel, g")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc="lower left")
     return figure
 
 

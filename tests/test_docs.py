@@ -10,7 +10,10 @@ from pathlib import Path
 
 import pytest
 
+import hevopt
+from hevopt.bounds import certificate
 from hevopt.cli import main
+from hevopt.strategies import dp
 from hevopt.studies.settings import Settings
 
 ROOT = Path(__file__).parents[1]
@@ -72,6 +75,29 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site" / "theory" / "certificates.html").is_file()
+
+
+def test_every_public_name_has_its_place_in_the_reference():
+    pages = "".join(page.read_text() for page in (ROOT / "docs" / "reference").glob("*.md"))
+    shown = set(re.findall(r"^::: (\S+)$", pages, re.M))
+    for name, home in hevopt._HOME.items():
+        assert f"{home}.{name}" in shown or home in shown, name
+
+
+def test_numbers_of_the_theory_are_those_of_the_code():
+    text = (ROOT / "docs" / "theory" / "dynamic_programming.md").read_text()
+    numbers = {
+        "ENERGY_NODES": f"{dp.ENERGY_NODES}",
+        "_BANDS": ", ".join(f"{band:g}" for band in dp._BANDS),
+        "_GAIN_WORTH_MORE": f"{1e5 * dp._GAIN_WORTH_MORE:g}·10⁻⁵ of the cost",
+        "_PROMISE_TOLERANCE": f"{100 * dp._PROMISE_TOLERANCE:g} %",
+    }
+    for name, value in numbers.items():
+        assert f"| {value} | `{name}` |" in text
+    assert f"| {dp._GENTLE:g}, or 10⁴ " in text and dp._STEEP == 1e4
+    proofs = (ROOT / "docs" / "theory" / "certificates.md").read_text()
+    assert f"above {100 * certificate.TARGET_GAP:g} %" in " ".join(proofs.split())
+    assert [f"{n:,}".replace(",", " ") in proofs for n in certificate.LOWER_DP_NODES] == [True] * 2
 
 
 def test_every_setting_of_a_study_has_its_line():

@@ -9,7 +9,7 @@ from typing import get_args
 
 import pytest
 
-from hevopt.car.architecture import CouplingKind
+from hevopt.car.templates import CouplingKind
 from hevopt.cli import main
 
 ROOT = Path(__file__).parents[1]
