@@ -11,8 +11,6 @@ from hevopt.commands.components import (
     SetOption,
     SheetOption,
     UnitOption,
-    digests,
-    own_file,
     values_of,
 )
 from hevopt.commands.options import pairs
@@ -50,51 +48,34 @@ def coastdown(
     sheet: SheetOption = None,
 ) -> None:
     """C0, C1, C2 of the road load from coast-downs in both directions, with confidence intervals."""
-    from hevopt.car_files.text import component_text
-    from hevopt.files.writing import check_outs, write_whole
-    from hevopt.measured.coastdown.car import car_base, car_contents, mass_of_test, said_of_mass
-    from hevopt.measured.coastdown.fit import fit_road_load
-    from hevopt.measured.coastdown.report import results
-    from hevopt.measured.coastdown.runs import ROLES, ROLES_WITH_UNIT, read_runs
+    from hevopt.files.writing import check_outs
+    from hevopt.measured.coastdown.car import said_of_mass
+    from hevopt.measured.coastdown.coastdown import coastdown as measure
+    from hevopt.measured.coastdown.coastdown import picture_kind
+    from hevopt.measured.coastdown.runs import ROLES, ROLES_WITH_UNIT
+    from hevopt.measured.sources import own_file
 
     check_outs({"--out": out, "--plot": plot}, [*files, *own_file(like)])
-    kind = None if plot is None else _picture_kind(plot)
-    values = values_of(given) | {
-        key: value
-        for key, value in (
-            ("wheel_inertia_kgm2", wheel_inertia_kgm2),
-            ("tyre_radius_m", tyre_radius_m),
-        )
-        if value is not None
-    }
-    car = car_base(like, values, rotating_mass_kg)
-    tested_kg = mass_of_test(mass_kg)
-    ways = None if directions is None else _ways(directions)
-    columns = pairs("--column", column, ROLES)
-    units = pairs("--unit", unit, ROLES_WITH_UNIT)
-    runs, notes = read_runs(files, columns, units, ways, sheet)
-    fit = fit_road_load(runs, tested_kg + car.rotating_kg)
-    said = results(runs, fit, tested_kg, car.rotating_kg)
-    contents = None if out is None else car_contents(fit, car, tested_kg)
-    said += said_of_mass(tested_kg) if contents else []
-    for note in notes:
+    if plot is not None:
+        picture_kind(plot)
+    found = measure(
+        files, mass_kg=mass_kg, rotating_mass_kg=rotating_mass_kg, wheel_inertia_kgm2=wheel_inertia_kgm2,
+        tyre_radius_m=tyre_radius_m, like=like, values=values_of(given),
+        directions=None if directions is None else _ways(directions),
+        columns=pairs("--column", column, ROLES), units=pairs("--unit", unit, ROLES_WITH_UNIT), sheet=sheet,
+    )  # fmt: skip
+    text = None if out is None else found.car_text()
+    for note in found.notes:
         write(f"  {printable(note)}")
-    write("\n".join(said))
-    if out is not None and contents is not None:
-        head = [
-            "Car with a road load from coast-downs, written by hevopt coastdown.",
-            *digests(files),
-            *notes,
-            *said,
-        ]
-        write_whole(out, component_text(head, contents, car.origins).encode())
+    said = [] if text is None else said_of_mass(found.mass_kg)
+    write("\n".join([*found.results, *said]))
+    if out is not None:
+        found.write(out)
         write(f"car written to {out}")
     else:
         write(f"no {'car ' * (plot is not None)}file written; --out FILE writes the car")
-    if plot is not None and kind is not None:
-        from hevopt.measured.coastdown.plot import coastdown_figure
-
-        write_whole(plot, coastdown_figure(runs, fit, kind))
+    if plot is not None:
+        found.write_plot(plot)
         write(f"plot written to {plot}")
 
 
@@ -107,12 +88,3 @@ def _ways(text: str) -> list[int]:
             f"--directions {shown(text)}: {shown(wrong[0])}; allowed: + and -, such as +,-,+,-"
         )
     return [known[word] for word in words]
-
-
-def _picture_kind(path: Path) -> str:
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
-        raise DataError(
-            f"--plot {printable(str(path))}: the name ends with no kind of picture; allowed: .png, .svg and .pdf"
-        )
-    return kind

@@ -1,13 +1,11 @@
 """Options that the commands share which write component files, and what they make of them."""
 
 import tomllib
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from hevopt.errors import DataError
-from hevopt.files.lookup import is_path
 from hevopt.files.shown import shown
 
 ColumnOption = Annotated[
@@ -42,20 +40,3 @@ def values_of(texts: list[str] | None) -> dict[str, Any]:
         except (ValueError, RecursionError):
             values[key.strip()] = value.strip()
     return values
-
-
-def own_file(like: str | None) -> list[str]:
-    """The file that --like names; none where it is a shipped component."""
-    return [like] if like is not None and is_path(like, ".toml") else []
-
-
-def digests(sources: list[Path]) -> list[str]:
-    """Name, SHA-256 and program of every input, for the head of what is written."""
-    import hashlib
-
-    from hevopt import __version__
-
-    return [
-        f"From {path.name}, SHA-256 {hashlib.sha256(path.read_bytes()).hexdigest()}, hevopt {__version__}."
-        for path in sources
-    ]

@@ -10,7 +10,7 @@ from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
-    from hevopt.measured.cycles.sampled import Imported
+    from hevopt.measured.cycles.sampled import ImportedCycle
 
 
 def import_cycle(
@@ -73,10 +73,11 @@ def import_cycle(
 ) -> None:
     """Read a drive in another tool's shape, check it, resample it to 1 Hz; write it with --out."""
     from hevopt.measured.cycles import cycle as cycle_import
+    from hevopt.measured.cycles.sampled import check_cycle_file
     from hevopt.measured.cycles.standstill import standstill_limit
 
     if out is not None:
-        _check_out(out, file)
+        check_cycle_file(out, file)
     units = pairs("--unit", unit)
     for role, given, option in (
         ("speed", speed_unit, "--speed-unit"),
@@ -98,8 +99,8 @@ def import_cycle(
     _write(imported, out, file)
 
 
-def _write(imported: tuple["Imported", ...], out: Path | None, file: Path) -> None:
-    from hevopt.files.writing import check_outs, write_whole
+def _write(imported: tuple["ImportedCycle", ...], out: Path | None, file: Path) -> None:
+    from hevopt.files.writing import check_outs
 
     if out is None:
         write("not written; add --out NAME.csv to write the cycle" + "s" * (len(imported) > 1))
@@ -109,11 +110,11 @@ def _write(imported: tuple["Imported", ...], out: Path | None, file: Path) -> No
         outs = [out.with_stem(f"{out.stem}_{k}") for k in range(1, len(imported) + 1)]
         check_outs({f"--out, trip {k}": path for k, path in enumerate(outs, start=1)}, [file])
     for path, cycle in zip(outs, imported, strict=True):
-        write_whole(path, cycle.text.encode())
+        cycle.write(path)
         write(f"written to {path}; use it with --cycle {path}")
 
 
-def _show(imported: "Imported") -> None:
+def _show(imported: "ImportedCycle") -> None:
     from hevopt.measured.cycles.sampled import summary
 
     for text in imported.assumptions:
@@ -127,11 +128,3 @@ def _show(imported: "Imported") -> None:
         write(f"{name:18}{text}")
     for text in imported.hints:
         write(text)
-
-
-def _check_out(out: Path, file: Path) -> None:
-    from hevopt.files.writing import check_outs
-
-    if out.suffix.lower() != ".csv":
-        raise DataError(f"--out {out}: a cycle file's name ends in .csv; give such a name")
-    check_outs({"--out": out}, [file])

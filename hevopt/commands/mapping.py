@@ -1,7 +1,7 @@
 """`hevopt maps import`: points of a test bench to component files."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -11,20 +11,12 @@ from hevopt.commands.components import (
     SetOption,
     SheetOption,
     UnitOption,
-    digests,
-    own_file,
     values_of,
 )
 from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 from hevopt.files.shown import printable
-
-if TYPE_CHECKING:
-    from hevopt.measured.maps.request import Request
-
-# First line of every component that an import writes, by which the next import knows it.
-_HEAD = "Measured map, written by hevopt maps import."
 
 maps_app = typer.Typer(help="Measured maps of engines and machines.", rich_markup_mode=None)
 
@@ -77,88 +69,29 @@ def import_map(
     in MATLAB or Octave, there save('map.mat', 'fc_map_spd', 'fc_map_trq', 'fc_fuel_map', 'fc_max_trq', '-v7'), and
     import map.mat; a machine's file is its --full-load too.
     """
-    from hevopt.car_files.text import component_text
-    from hevopt.files.writing import check_outs, write_whole
-    from hevopt.measured.maps.engine import import_engine
-    from hevopt.measured.maps.machine import import_machine
-    from hevopt.measured.maps.plot import map_figure
-    from hevopt.measured.maps.report import coverage
+    from hevopt.measured.maps.component import check_map_file, with_suffix
+    from hevopt.measured.maps.component import import_map as measured_map
+    from hevopt.measured.maps.roles import ROLES
+    from hevopt.measured.sources import own_file
 
     values = values_of(given)
     if displacement_cm3 is not None:
         if "displacement_cm3" in values:
             raise DataError("--displacement-cm3 and --set displacement_cm3 are one key; give one")
         values["displacement_cm3"] = displacement_cm3
-    extra = {"full": full_load, "motoring": motoring, "nox": nox}
-    request = _request(file, sheet, column, unit, rows, like, extra, values)
-    sources = [file, *(source.path for source in request.extra.values())]
-    out = _beside(file, ".toml") if out is None else out
-    plot = _beside(out, ".png")
-    check_outs({"--out": out, "the plot": plot}, [*sources, *own_file(like)])
-    _check_own(out, plot)
-    imported = import_engine(request) if kind == "engine" else import_machine(request)
-    said = coverage(imported)
-    head = [
-        _HEAD,
-        *digests(sources),
-        *imported.notes,
-        *said,
-    ]
-    text = component_text(head, imported.contents, imported.origins)
-    picture = map_figure(imported)
-    write_whole(out, text.encode())
-    write_whole(plot, picture)
+    out = with_suffix(file, ".toml") if out is None else out
+    check_map_file(out, (file, *map(Path, own_file(like))))
+    found = measured_map(
+        file, kind, like=like, full_load=full_load, motoring=motoring, nox=nox,
+        columns=pairs("--column", column, ROLES), units=pairs("--unit", unit, ROLES), rows=rows,
+        sheet=sheet, values=values,
+    )  # fmt: skip
+    plot, imported = found.write(out), found.imported
     for note in imported.notes:
         write(f"  {printable(note)}")
     kept = {key: origin for key, origin in imported.origins.items() if origin}
     for origin in dict.fromkeys(kept.values()):
         keys = ", ".join(key for key, other in kept.items() if other == origin)
         write(f"  {printable(origin)}: {printable(keys)}")
-    write("\n".join(said))
+    write("\n".join(found.coverage))
     write(f"component written to {out}, plot to {plot}")
-
-
-def _request(
-    file: Path,
-    sheet: str | None,
-    column: list[str] | None,
-    unit: list[str] | None,
-    rows: str | None,
-    like: str | None,
-    extra: dict[str, str | None],
-    values: dict[str, Any],
-) -> "Request":
-    from hevopt.measured.maps.request import Request
-    from hevopt.measured.maps.roles import ROLES
-    from hevopt.measured.maps.tables import Source
-
-    columns, units = pairs("--column", column, ROLES), pairs("--unit", unit, ROLES)
-    others = {}
-    for role, text in extra.items():
-        if text is not None:
-            path, mark, behind = (text, "", "") if Path(text).exists() else text.partition("#")
-            own = {role: columns[role]} if role in columns else {}
-            own = columns if Path(path) == file else own
-            of_sheet = behind if mark else None
-            others[role] = Source(Path(path), of_sheet, own, units, rows, extra=True)
-    return Request(Source(file, sheet, columns, units, rows), others, like, values)
-
-
-def _beside(path: Path, suffix: str) -> Path:
-    if not path.stem or path.stem == "..":
-        raise DataError(f"{path}: not the name of a file")
-    return path.with_suffix(suffix)
-
-
-def _check_own(out: Path, plot: Path) -> None:
-    """DataError where the component or its plot would replace a file that no map import has written."""
-    if out.exists():
-        with out.open("rb") as file:
-            if file.readline().strip() == f"# {_HEAD}".encode():
-                return
-    for path in (out, plot):
-        if path.exists():
-            raise DataError(
-                f"{path} exists, and hevopt maps import has not written it; give another name with --out, or "
-                "remove it yourself"
-            )

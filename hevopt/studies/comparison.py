@@ -1,14 +1,9 @@
 """The study: run strategies on architectures over one cycle, and collect a row for each."""
 
-import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from pathlib import Path
-from types import NoneType
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, get_args
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown, html_table
@@ -19,9 +14,8 @@ from hevopt.errors import (
     InfeasibleError,
     SolverError,
     UnknownNoxError,
-    unknown_name,
 )
-from hevopt.files.shown import printable, shown
+from hevopt.files.keywords import check_keywords
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.strategies import Strategy, chosen, strategy_named
 from hevopt.studies.cars import cars_of
@@ -120,7 +114,7 @@ def solve(problem: Problem, strategy: str = "dp", **settings: Any) -> Plan:
     Raises DataError for a name or a setting that there is not, with those that there are.
     """
     own = strategy_named(strategy).solve
-    _check_keywords(f"solve, {strategy}", own, settings)
+    check_keywords(f"solve, {strategy}", own, settings)
     return own(problem, **settings)
 
 
@@ -229,32 +223,6 @@ def _raise_unknown_nox(rows: Sequence[Row], failures: Mapping[str, HevoptError])
     unknown = [error for error in failures.values() if isinstance(error, UnknownNoxError)]
     if unknown and len(unknown) == len(failures) and not any(row.solved for row in rows):
         raise unknown[0]
-
-
-def _check_keywords(place: str, function: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """DataError where a function does not take a keyword, or needs one that is not given."""
-    own = list(inspect.signature(function).parameters.values())[1:]
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in own):
-        return
-    known = [parameter.name for parameter in own]
-    for name in given:
-        if name not in known:
-            if not known:
-                raise DataError(f"{place}: setting {printable(name)!r}; this strategy takes none")
-            raise DataError(f"{place}: {unknown_name('setting', printable(name), known)}")
-        _check_number(place, name, own[known.index(name)].annotation, given[name])
-    missing = [p.name for p in own if p.default is p.empty and p.name not in given]
-    if missing:
-        raise DataError(f"{place} needs {', '.join(missing)}; give it as a keyword")
-
-
-def _check_number(place: str, name: str, kind: Any, value: Any) -> None:
-    """DataError where a parameter is annotated as a number, or none, and the value is neither."""
-    kinds = set(get_args(kind) or [kind])
-    if kinds <= {int, float, bool, NoneType} and not (
-        isinstance(value, Real | np.bool_) or (value is None and NoneType in kinds)
-    ):
-        raise DataError(f"{place}: {name} = {shown(value)}; needed: a number")
 
 
 def lost_proofs(case: Case) -> dict[str, str]:

@@ -453,7 +453,7 @@ def test_what_has_no_meaning_for_a_car_is_left_out_and_said():
     [
         ("dp", {"node": 100}, "solve, dp: setting 'node' not found; close matches: nodes; available: "),
         ("dp", {"nodes": "many"}, "solve, dp: nodes = 'many'; needed: a number"),
-        ("ecms", {"nodes": 100}, "solve, ecms: setting 'nodes'; this strategy takes none"),
+        ("ecms", {"nodes": 100}, "solve, ecms: setting 'nodes'; there is none"),
         ("sdp", {}, "solve, sdp needs training"),
         ("mcp", {}, "strategy 'mcp' not found; close matches: mpc"),
     ],

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 from hevopt.car_files.car import CarFile
 from hevopt.errors import DataError
 from hevopt.files.lookup import find
+from hevopt.files.shown import shown
 from hevopt.files.toml import checked, read_toml
 from hevopt.measured.coastdown.fit import RoadLoad
 
@@ -66,13 +68,14 @@ def car_base(like: str | None, given: Mapping[str, Any], rotating_kg: float | No
 def mass_of_test(mass_kg: float | None) -> float:
     """The mass of the tested car, if it is given and can be one; else DataError."""
     low, high = _MASS_KG
-    if mass_kg is None or not low <= mass_kg <= high:
-        found = "is missing" if mass_kg is None else f"{mass_kg:g}"
+    number = isinstance(mass_kg, Real) and not isinstance(mass_kg, bool)
+    if mass_kg is None or not (number and low <= mass_kg <= high):
+        found = "is missing" if mass_kg is None else shown(mass_kg)
         raise DataError(
             f"--mass-kg {found}: coast-downs give force per mass; give the mass of the car as tested, driver "
             f"included, {low:g} to {high:g} kg"
         )
-    return mass_kg
+    return float(mass_kg)
 
 
 def car_contents(fit: RoadLoad, base: CarBase, mass_kg: float) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.errors import DataError, unknown_name
+from hevopt.files.keywords import check_keywords
 from hevopt.measured.cycles.columns import Drive, drive_of
 from hevopt.measured.cycles.distance import over_time
 from hevopt.measured.cycles.fault_list import Faults, refused
@@ -21,20 +22,29 @@ from hevopt.measured.cycles.gaps import (
     moving_ends,
     parts_of,
 )
-from hevopt.measured.cycles.sampled import Imported, Told, cycle_from, with_grade
+from hevopt.measured.cycles.sampled import ImportedCycle, Told, cycle_from, with_grade
 from hevopt.measured.cycles.standstill import never_at_rest, standing
 from hevopt.measured.cycles.times import DROPOUT_MAX_S, coarse, long_steps
 from hevopt.measured.tables.table import read_measured
 
 
-def import_cycle(path: Path, **options: Any) -> Imported:
-    """The one cycle in a measured file; options as of `import_drives`."""
-    (imported,) = import_drives(path, **options)
+def import_cycle(path: str | Path, **options: Any) -> ImportedCycle:
+    """The one cycle in a measured file: a logged drive, or another tool's, checked and resampled to 1 Hz.
+
+    options: those of `import_drives`, which gives several where gaps is "split". Raises DataError as that does, and
+    for an option that it does not have.
+    """
+    check_keywords("import_cycle", import_drives, options)
+    imported, *others = import_drives(path, **options)
+    if others:
+        raise DataError(
+            f"import_cycle: {path} holds {1 + len(others)} trips; import_drives gives all of them"
+        )
     return imported
 
 
 def import_drives(
-    path: Path,
+    path: str | Path,
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
@@ -44,8 +54,8 @@ def import_drives(
     acceleration_mps2: float | None = None,
     standstill_mps: float | None = None,
     altitude_baseline_m: float | None = None,
-) -> tuple[Imported, ...]:
-    """The cycle in a measured file, or its trips where gaps is "split".
+) -> tuple[ImportedCycle, ...]:
+    """The cycle in a measured file, at 1 Hz, or its trips where gaps is "split".
 
     Raises DataError with every fault by line where the file has any and `repair` is not set.
     columns, units: role (time, date, speed, distance, stop, grade, altitude, gear, clutch_open) to a column's name,
@@ -55,6 +65,7 @@ def import_drives(
     standstill_mps: slower than which for a while the car counts as standing
     gaps: cut, split or bridge those of more than a minute
     """
+    path = Path(path)
     measured = read_measured(path, sheet=sheet)
     drive = drive_of(measured, columns or {}, units or {})
     _check_options(drive, gaps, acceleration_mps2, standstill_mps, altitude_baseline_m)
@@ -118,7 +129,7 @@ class _Making:
     standstill_mps: float | None
     altitude_baseline_m: float | None
 
-    def cycles(self, found: Sound, gaps: str | None) -> tuple[Imported, ...]:
+    def cycles(self, found: Sound, gaps: str | None) -> tuple[ImportedCycle, ...]:
         """The cycles of a drive, with its long gaps dealt with as told."""
         drive, rows = found.drive, found.long_gaps
         hints = (*drive.hints, *coarse(drive))
@@ -140,14 +151,14 @@ class _Making:
             for k, part in enumerate(parts.drives, start=1)
         )
 
-    def _joined(self, parts: tuple[Drive, ...], told: Told) -> Imported:
+    def _joined(self, parts: tuple[Drive, ...], told: Told) -> ImportedCycle:
         """One cycle of all parts, each with the grade of its own altitude."""
         graded = [with_grade(part, self.altitude_baseline_m) for part in parts]
         for _, of_part in graded:
             told = _with(told, of_part.rules, of_part.hints)
         return self._cycle(joined(tuple(part for part, _ in graded)), told)
 
-    def _cycle(self, drive: Drive, told: Told) -> Imported:
+    def _cycle(self, drive: Drive, told: Told) -> ImportedCycle:
         told = _with(told, long_steps(drive))
         if self.standstill_mps is None:
             told = _with(told, hints=never_at_rest(drive))

@@ -12,7 +12,7 @@ from hevopt import __version__
 from hevopt.driving.cycle import SAMPLES_MAX, Cycle, cycle_of
 from hevopt.errors import DataError
 from hevopt.files.shown import printable
-from hevopt.files.writing import csv_comment
+from hevopt.files.writing import check_outs, csv_comment, write_whole
 from hevopt.measured.cycles.altitude import grade_from_altitude
 from hevopt.measured.cycles.columns import Drive
 from hevopt.measured.resample import distance_at, mean_grades, one_hertz_times, rows_at, speeds_at
@@ -29,7 +29,7 @@ _TIME_DIGITS, _SPEED_DIGITS, _GRADE_DIGITS = 6, 6, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Imported:
+class ImportedCycle:
     """A cycle made from a file, with texts for the user.
 
     text: the cycle file; assumptions: how the file was read; rules: how the cycle was made; repairs: by line
@@ -46,6 +46,12 @@ class Imported:
     repairs: tuple[str, ...]
     hints: tuple[str, ...]
 
+    def write(self, out: str | Path) -> None:
+        """Write the cycle file; DataError where its name does not end in .csv, or it cannot be written."""
+        path = Path(out)
+        check_cycle_file(path, self.source)
+        write_whole(path, self.text.encode())
+
 
 @dataclass(frozen=True, slots=True)
 class Told:
@@ -56,7 +62,16 @@ class Told:
     hints: tuple[str, ...] = ()
 
 
-def cycle_from(path: Path, drive: Drive, told: Told, altitude_baseline_m: float | None) -> Imported:
+def check_cycle_file(out: Path, source: Path) -> None:
+    """DataError where a cycle file could not be written there, or would replace the one that it is made from."""
+    if out.suffix.lower() != ".csv":
+        raise DataError(f"--out {out}: a cycle file's name ends in .csv; give such a name")
+    check_outs({"--out": out}, [source])
+
+
+def cycle_from(
+    path: Path, drive: Drive, told: Told, altitude_baseline_m: float | None
+) -> ImportedCycle:
     """The cycle of a drive over time. path: the file that it comes from"""
     distance_m = _distance(drive)[-1]
     columns, rules, noticed = _at_one_hertz(drive, altitude_baseline_m)
@@ -65,12 +80,12 @@ def cycle_from(path: Path, drive: Drive, told: Told, altitude_baseline_m: float 
     said = [*(f"read as: {text}" for text in assumptions), *(f"made by: {text}" for text in rules)]
     shown = drive.measured.path
     text = _text(path, shown, [*said, *hints], told.repairs, columns)
-    return Imported(
+    return ImportedCycle(
         shown, _checked(shown, text), text, float(distance_m), assumptions, rules, told.repairs, hints
     )  # fmt: skip
 
 
-def summary(imported: Imported) -> list[tuple[str, str]]:
+def summary(imported: ImportedCycle) -> list[tuple[str, str]]:
     """Name and text of each figure that tells whether a cycle was read as meant."""
     cycle = imported.cycle
     speed, step_s = cycle.speed_mps, np.diff(cycle.time_s)

@@ -15,7 +15,7 @@ from hevopt.measured.maps.limits import lowered
 from hevopt.measured.maps.lines import Lines, in_lines, is_idle
 from hevopt.measured.maps.points import Curve, EngineFacts, read_points
 from hevopt.measured.maps.request import (
-    Imported,
+    ImportedMap,
     Request,
     check_used,
     like_component,
@@ -30,7 +30,7 @@ _ENGINE_KEYS = (
 _FUEL_KEYS = ("heating_value_mjpkg", "density_kgpl", "co2_kgpkg")
 
 
-def import_engine(request: Request) -> Imported:
+def import_engine(request: Request) -> ImportedMap:
     """An engine with a measured map; DataError where something is missing or wrong."""
     like = like_component(request.like, EngineFile)
     base, origins = _engine_base(request, like)
@@ -69,7 +69,7 @@ def import_engine(request: Request) -> Imported:
     limit = {"speed_rpm": rpm_list(full.speed_radps), "torque_nm": full.torque_nm.tolist()}
     contents = base | {"full_load": limit, "fuel_map": maps}
     file = checked(f"component from {request.source.path.name}", contents, EngineFile)
-    return Imported(contents, file, origins, tuple(notes), grid, lines, of_nox)
+    return ImportedMap(contents, file, origins, tuple(notes), grid, lines, of_nox)
 
 
 def _fuel(request: Request, facts: EngineFacts, idle_radps: float) -> Lines:

@@ -9,7 +9,7 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.machine import MachineFile
 from hevopt.display.facts import Shown
 from hevopt.measured.maps.grid import Grid
-from hevopt.measured.maps.request import Imported
+from hevopt.measured.maps.request import ImportedMap
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ def between(grid: Grid, envelope: Envelope) -> tuple[Array, NDArray[np.bool_]]:
     return torque, ~np.isnan(grid.at(torque, envelope.speed_radps[:, None]))
 
 
-def accepted(imported: Imported, speed_radps: Array, torque_nm: Array) -> NDArray[np.bool_]:
+def accepted(imported: ImportedMap, speed_radps: Array, torque_nm: Array) -> NDArray[np.bool_]:
     """Where a car may use the component: within its limits, and all that the file holds a map of is known."""
     envelope = envelope_of(imported.file, speed_radps)
     inside = (torque_nm >= envelope.low_nm) & (torque_nm <= envelope.high_nm)

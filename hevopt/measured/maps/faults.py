@@ -9,7 +9,7 @@ from hevopt.measured.maps.envelope import Envelope, in_reach, mesh, place
 from hevopt.measured.maps.gaps import WIDE, fired, widest_gap
 from hevopt.measured.maps.grid import Grid
 from hevopt.measured.maps.lines import Lines
-from hevopt.measured.maps.request import Imported
+from hevopt.measured.maps.request import ImportedMap
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ _SMALL = 0.01
 _OFF = 0.02
 
 
-def faults(imported: Imported, envelope: Envelope, what: str) -> list[str]:
+def faults(imported: ImportedMap, envelope: Envelope, what: str) -> list[str]:
     """Lines of text about the map of "fuel" or "loss", as far as the component gets."""
     grid, lines = imported.grid, imported.lines
     speed, torque = mesh(grid)

@@ -12,7 +12,7 @@ from hevopt.measured.maps.limits import cell_at, near
 from hevopt.measured.maps.lines import in_lines
 from hevopt.measured.maps.points import Curve, EngineFacts, Points, read_curve, read_points
 from hevopt.measured.maps.request import (
-    Imported,
+    ImportedMap,
     Request,
     check_used,
     like_component,
@@ -26,7 +26,7 @@ from hevopt.measured.tables.rows import runs
 _SENSIBLE = 0.1
 
 
-def import_machine(request: Request) -> Imported:
+def import_machine(request: Request) -> ImportedMap:
     """A machine with a measured loss map; DataError where something is missing or wrong."""
     engines = sorted({*request.extra} - {"full"})
     if engines:
@@ -94,7 +94,7 @@ def import_machine(request: Request) -> Imported:
         }
     )
     file = checked(f"component from {request.source.path.name}", contents, MachineFile)
-    return Imported(contents, file, origins, tuple(notes), _both_signs(grid), measured)
+    return ImportedMap(contents, file, origins, tuple(notes), _both_signs(grid), measured)
 
 
 def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:

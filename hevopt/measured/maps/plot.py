@@ -10,7 +10,7 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.display.axes import plain
 from hevopt.measured.maps.envelope import Envelope, accepted, envelope_of
 from hevopt.measured.maps.gaps import WIDE, lowest_fired_nm, widest_gap
-from hevopt.measured.maps.request import Imported
+from hevopt.measured.maps.request import ImportedMap
 from hevopt.measured.plot import _png
 from hevopt.units import RPM_PER_RADPS
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 _CELLS = 500
 
 
-def map_figure(imported: Imported) -> bytes:
+def map_figure(imported: ImportedMap) -> bytes:
     """Coverage of a map: what a car can use, measured points, limits, and efficiency as contours."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
@@ -52,7 +52,7 @@ def map_figure(imported: Imported) -> bytes:
     return _png(figure)
 
 
-def _doubts(axes: "Axes", imported: Imported, envelope: Envelope) -> None:
+def _doubts(axes: "Axes", imported: ImportedMap, envelope: Envelope) -> None:
     """Hatches where an engine's flow is assumed, and a ring around a wide gap between points."""
     if isinstance(imported.file, EngineFile):
         lowest = lowest_fired_nm(imported.lines, envelope.speed_radps)
@@ -71,7 +71,7 @@ def _doubts(axes: "Axes", imported: Imported, envelope: Envelope) -> None:
         )  # fmt: skip
 
 
-def covered_mesh(imported: Imported) -> tuple[Array, Array, NDArray[np.bool_]]:
+def covered_mesh(imported: ImportedMap) -> tuple[Array, Array, NDArray[np.bool_]]:
     """(speed, torque) centres of the plot's cells over the map and the limits, and which are usable."""
     grid, envelope = imported.grid, envelope_of(imported.file)
     low = min(grid.torque_nm[0], envelope.low_nm.min())
@@ -84,7 +84,7 @@ def covered_mesh(imported: Imported) -> tuple[Array, Array, NDArray[np.bool_]]:
 
 
 def _efficiency_contours(
-    axes: "Axes", imported: Imported, speed: Array, torque: Array, usable: NDArray[np.bool_]
+    axes: "Axes", imported: ImportedMap, speed: Array, torque: Array, usable: NDArray[np.bool_]
 ) -> None:
     flow, file = imported.grid.at(torque, speed), imported.file
     power = np.where(torque * speed == 0, np.nan, np.abs(torque * speed))

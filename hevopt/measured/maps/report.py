@@ -12,7 +12,7 @@ from hevopt.measured.maps.faults import at_points, faults
 from hevopt.measured.maps.gaps import lowest_fired_nm
 from hevopt.measured.maps.grid import Grid
 from hevopt.measured.maps.lines import Lines
-from hevopt.measured.maps.request import Imported
+from hevopt.measured.maps.request import ImportedMap
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -22,13 +22,13 @@ _ABOVE = 1.05
 _EFFICIENCIES = (0.15, 0.6)
 
 
-def coverage(imported: Imported) -> list[str]:
+def coverage(imported: ImportedMap) -> list[str]:
     """Lines of text about a component's map."""
     of = _engine if isinstance(imported.file, EngineFile) else _machine
     return of(imported, imported.file)
 
 
-def _engine(imported: Imported, file: EngineFile) -> list[str]:
+def _engine(imported: ImportedMap, file: EngineFile) -> list[str]:
     grid, envelope = imported.grid, envelope_of(file)
     heat = file.fuel.heating_value_mjpkg * 1e6
     said = [_extent(grid), *_engine_share(grid, imported.lines, envelope)]
@@ -54,7 +54,7 @@ def _engine(imported: Imported, file: EngineFile) -> list[str]:
     return said if imported.nox is None else said + _nox(imported, file, envelope)
 
 
-def _machine(imported: Imported, file: MachineFile) -> list[str]:
+def _machine(imported: ImportedMap, file: MachineFile) -> list[str]:
     grid, envelope = imported.grid, envelope_of(file)
     said = [_extent(grid), _share(grid, envelope, "within torque and power limit")]
     speed, torque = corners(grid, file)
@@ -136,7 +136,7 @@ def _lowest(lines: Lines, envelope: Envelope) -> str:
     return f"{' to '.join(ends)} Nm"
 
 
-def _nox(imported: Imported, file: EngineFile, envelope: Envelope) -> list[str]:
+def _nox(imported: ImportedMap, file: EngineFile, envelope: Envelope) -> list[str]:
     """What the map of NOx covers, and what a car with this engine cannot do for want of it."""
     grid, lines = imported.nox
     said = [

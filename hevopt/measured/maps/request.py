@@ -35,7 +35,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Imported:
+class ImportedMap:
     """A component. contents: of its file, also checked as `file`; origins: key path -> where it comes from;
     notes: what was read, assumed and left out; grid and lines: the map of fuel or loss, and the points behind it
     nox: an engine's map of NOx, on the same axes, and its points; None where it is not known
