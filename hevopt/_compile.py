@@ -21,14 +21,21 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
 
 _DIGEST_BYTES = hashlib.sha256().digest_size
+# Files of loops, and of the tuples and constants that they are compiled with.
+_COMPILED_WITH = ("_*kernels.py", "parameters.py", "states.py")
 _Loop = TypeVar("_Loop", bound=Callable[..., Any])
 
 
-def compiled(*, inline: Literal["never", "always"] = "never") -> Callable[[_Loop], _Loop]:
-    """Decorator: numba.njit, kept on disk; without that where neither package nor home can be written."""
+def compiled(
+    *, inline: Literal["never", "always"] = "never", nogil: bool = False
+) -> Callable[[_Loop], _Loop]:
+    """Decorator: numba.njit, kept on disk; without that where neither package nor home can be written.
+
+    nogil: others may run meanwhile, for loops that threads share
+    """
 
     def decorate(function: _Loop) -> _Loop:
-        loop: Any = numba.njit(inline=inline)(function)
+        loop: Any = numba.njit(inline=inline, nogil=nogil)(function)
         if isinstance(loop, Dispatcher):
             try:
                 loop._cache = _Cache(function)  # type: ignore[attr-defined]
@@ -91,6 +98,7 @@ class _Files(IndexDataCacheFile):  # type: ignore[misc]
 def _loops_digest() -> str:
     """Of the text of all loops: a loop carries those it calls, of other files too, inside."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("_*kernels.py")):
+    folder = Path(__file__).parent
+    for path in sorted(path for name in _COMPILED_WITH for path in folder.rglob(name)):
         digest.update(path.read_bytes())
     return digest.hexdigest()

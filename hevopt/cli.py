@@ -19,6 +19,7 @@ from hevopt.commands import (
     solving,
     studies,
     sweep,
+    turbo,
 )
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
@@ -58,12 +59,14 @@ for command in (
     studies.pareto,
     studies.sensitivity,
     studies.reproduction,
+    turbo.tipin,
 ):
     app.command()(command)
 app.add_typer(listing.architectures_app, name="architectures")
 listing.cycles_app.command("import")(importing.import_cycle)
 app.add_typer(listing.cycles_app, name="cycles")
 app.add_typer(mapping.maps_app, name="maps")
+app.add_typer(turbo.engine_app, name="engine")
 
 
 def main() -> None:

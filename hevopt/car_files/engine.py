@@ -18,6 +18,7 @@ from hevopt.car_files.fields import (
     StartFuel,
     check_grid,
 )
+from hevopt.car_files.mean_value import MeanValueFile
 from hevopt.files.toml import FileModel
 
 NotPositive = Annotated[float, Field(ge=-1e6, le=0)]
@@ -89,6 +90,7 @@ class EngineFile(FileModel):
     fuel_coefficients: FuelCoefficientsFile | None = None
     fuel_map: EngineGridFile | None = None
     nox_coefficients: NoxCoefficientsFile | None = None
+    mean_value: MeanValueFile | None = None
     scale: EngineScaleFile | None = None
 
     @model_validator(mode="after")

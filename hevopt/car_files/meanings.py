@@ -3,6 +3,8 @@
 Model of a file or table -> key -> (unit, meaning). A test keeps it complete.
 """
 
+from hevopt.car_files.mean_value_meanings import MEAN_VALUE_MEANINGS
+
 _NAME = ("", "name shown in tables and messages")
 _CELLS_NAN = "rows are speeds, columns torques, nan where not measured"
 _ONE_FACTOR = "the factor k; give only one of its names, speeds unchanged they are the same"
@@ -69,6 +71,7 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "nox_coefficients": ("", "NOx in mg per litre of displacement and working cycle: "
                              "m0 + BS p_me (n/2000)^0.19 / 36, n in 1/min, p_me in bar, brake-specific "
                              "BS = lo + (hi - lo) / (1 + exp(-(p_me - p0 - p1 (n/1000 - 2)) / dp)) in g/kWh"),
+        "mean_value": ("", "the engine beyond its map, for turbo-lag: gas path, turbocharger, control unit"),
         "scale": ("", "another size of the same engine by one factor k: at equal speed torque, power, fuel, NOx, "
                   "drag, displacement, inertia and the fuel of a start are k times as large; stroke, speeds and "
                   "mean pressures stay (Willans scaling)"),
@@ -179,4 +182,5 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "max": ("-", "upper end of the window"),
         "end": ("-", "least state of charge at the end; without it that of the start (charge neutral)"),
     },
+    **MEAN_VALUE_MEANINGS,
 }  # fmt: skip

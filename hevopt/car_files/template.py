@@ -20,7 +20,7 @@ from hevopt.car_files import schema as file_schema
 from hevopt.car_files.load import COMPONENTS, component_contents, load_architecture
 from hevopt.car_files.meanings import MEANINGS
 from hevopt.errors import DataError, unknown_name
-from hevopt.files.lookup import read_text, shipped_folder, shipped_names
+from hevopt.files.lookup import grouped_names, read_text, shipped_folder, shipped_names
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import read_contents
 
@@ -78,7 +78,7 @@ def _check_name(name: str, out: Path) -> None:
             f"architecture name {shown(name)}; allowed: up to 60 letters, digits, - and _, the first a "
             "letter or digit; --out says where the file goes"
         )
-    shipped = shipped_names("architectures", ".toml")
+    shipped = shipped_names("architectures", ".toml") + grouped_names("architectures", ".toml")
     if name.lower() in (other.lower() for other in shipped):
         raise DataError(
             f"architecture name {name} is that of a shipped one ({', '.join(shipped)}); choose another"

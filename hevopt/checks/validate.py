@@ -19,7 +19,7 @@ from hevopt.checks.files import (
 )
 from hevopt.checks.studies import compare_faults, sweep_faults
 from hevopt.errors import DataError, HevoptError
-from hevopt.files.lookup import find, is_path, meant_by, shipped_names
+from hevopt.files.lookup import find, grouped_names, is_path, meant_by, shipped_names
 from hevopt.files.shown import printable, shown
 
 _SHIPPED = (("architectures", ".toml"), ("cycles", ".csv"), ("architectures/components", ".toml"))
@@ -58,6 +58,7 @@ def _file(name: str) -> Path:
             f"{shown(name)} cannot be looked up ({error.strerror}); check the path"
         ) from None
     names = {n: (kind, suffix) for kind, suffix in _SHIPPED for n in shipped_names(kind, suffix)}
+    names |= {n: _SHIPPED[0] for n in grouped_names(*_SHIPPED[0])}
     if name in names:
         kind, suffix = names[name]
         return find(kind, name, suffix)

@@ -21,12 +21,14 @@ def architectures(context: typer.Context) -> None:
     if context.invoked_subcommand:
         return
     from hevopt.car_files.load import load_architecture
-    from hevopt.files.lookup import shipped_names
+    from hevopt.files.lookup import grouped_names, shipped_names
     from hevopt.strategies import fitting
 
-    for name in shipped_names("architectures", ".toml"):
-        car = load_architecture(name)
-        write(f"{name:4} {car.description:45} {', '.join(fitting(car.functions))}")
+    for group in (shipped_names("architectures", ".toml"), grouped_names("architectures", ".toml")):
+        width = max(4, *map(len, group))
+        for name in group:
+            car = load_architecture(name)
+            write(f"{name:{width}} {car.description:45} {', '.join(fitting(car.functions))}")
 
 
 @cycles_app.callback(invoke_without_command=True)

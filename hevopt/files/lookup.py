@@ -83,6 +83,17 @@ def shipped_names(kind: str, suffix: str) -> list[str]:
     return sorted(p.stem for p in shipped_folder(kind).glob(f"*{suffix}"))
 
 
+def grouped_names(kind: str, suffix: str) -> list[str]:
+    """Names of the shipped files in groups of a kind, which stand for no comparison unless they are named."""
+    return [name for folder in _groups(kind) for name in _names_in(folder, suffix)]
+
+
+def _groups(kind: str) -> list[Path]:
+    """Folders of a kind beside that of its components."""
+    folders = shipped_folder(kind).iterdir() if shipped_folder(kind).is_dir() else ()
+    return sorted(f for f in folders if f.is_dir() and f.name != "components")
+
+
 def is_path(text: str, suffix: str) -> bool:
     """Whether a text means a file where it stands, rather than the name of one."""
     return "/" in text or "\\" in text or text.endswith(suffix)
@@ -105,14 +116,14 @@ def find(
     try:
         if is_path(text, suffix):
             return _file_at(text, kind, word, suffix, beside, fits)
-        for folder in filter(None, (beside, shipped_folder(kind))):
+        for folder in filter(None, (beside, shipped_folder(kind), *_groups(kind))):
             if (folder / f"{text}{suffix}").is_file():
                 return folder / f"{text}{suffix}"
     except OSError as error:
         raise DataError(
             f"{word} {shown(text)} cannot be looked up ({error.strerror}); check the name or path"
         ) from None
-    known = [*_names_in(beside, suffix), *shipped_names(kind, suffix)]
+    known = [*_names_in(beside, suffix), *shipped_names(kind, suffix), *grouped_names(kind, suffix)]
     known = list(filter(fits, dict.fromkeys(known)))
     raise unknown_name(word, text, known, meant_by(kind, text))
 

@@ -1,19 +1,14 @@
-"""Carried out of hevopt/imports/figures.py."""
+"""Figures as files: the same bytes from the same figure."""
 
 from io import BytesIO
-from typing import TYPE_CHECKING
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-if TYPE_CHECKING:
-    pass
-
-
 _DPI = 110
 
 
-def _vectors(figure: Figure, kind: str) -> bytes:
+def vectors(figure: Figure, kind: str) -> bytes:
     """An SVG or PDF, without its date and with names of parts that do not depend on chance."""
     out = BytesIO()
     with rc_context({"svg.hashsalt": "hevopt"}):
@@ -22,7 +17,8 @@ def _vectors(figure: Figure, kind: str) -> bytes:
     return out.getvalue()
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """A PNG, without the version of what drew it."""
     out = BytesIO()
     figure.savefig(out, format="png", dpi=_DPI, metadata={"Software": None})
     return out.getvalue()

@@ -46,7 +46,7 @@ def bad(folder):
     (folder / "components").mkdir()
     text = (COMPONENTS / "engine_diesel_1600.toml").read_text()
     text = re.sub("idle_rpm = .*", "idle_rpm = 8500.0", text)
-    text = re.sub("inertia_kgm2 = .*", "inertia_kg2 = 0.2", text)
+    text = re.sub("inertia_kgm2 = .*", "inertia_kg2 = 0.2", text, count=1)
     (folder / "components" / "my_engine.toml").write_text(text)
     (folder / "bad.toml").write_text(BAD)
     return "bad.toml"

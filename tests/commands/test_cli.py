@@ -58,7 +58,8 @@ def test_cycles_and_architectures_are_listed(monkeypatch, capsys):
     _, cycles, _ = call(monkeypatch, capsys, "cycles")
     _, cars, _ = call(monkeypatch, capsys, "architectures")
     assert "11.03 km" in cycles and len(cycles.splitlines()) == 9
-    assert [line.split()[0] for line in cars.splitlines()] == ["A", "B", "C1", "C2", "D", "E"]
+    names = [line.split()[0] for line in cars.splitlines()]
+    assert names == ["A", "B", "C1", "C2", "D", "E", "compact_1300"]
 
 
 def test_a_cycle_the_car_cannot_follow_ends_with_3_unless_shortfall_is_allowed(monkeypatch, capsys):

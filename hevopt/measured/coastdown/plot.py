@@ -10,7 +10,7 @@ from hevopt.units import KMH_PER_MPS
 
 if TYPE_CHECKING:
     pass
-from hevopt.measured.plot import _png, _vectors
+from hevopt.measured.plot import png, vectors
 
 _COLOURS = {1: "#0b6e99", -1: "#c2571a"}
 
@@ -44,4 +44,4 @@ def coastdown_figure(runs: list[Run], fit: RoadLoad, kind: str) -> bytes:
     force.set(xlabel="speed, km/h", ylabel="resistance, N")
     for axes in (speeds, force):
         axes.legend()
-    return _png(figure) if kind == "png" else _vectors(figure, kind)
+    return png(figure) if kind == "png" else vectors(figure, kind)

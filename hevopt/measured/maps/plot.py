@@ -11,7 +11,7 @@ from hevopt.display.axes import plain
 from hevopt.measured.maps.envelope import Envelope, accepted, envelope_of
 from hevopt.measured.maps.gaps import WIDE, lowest_fired_nm, widest_gap
 from hevopt.measured.maps.request import ImportedMap
-from hevopt.measured.plot import _png
+from hevopt.measured.plot import png
 from hevopt.units import RPM_PER_RADPS
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def map_figure(imported: ImportedMap) -> bytes:
         xlabel="speed, rpm", ylabel="torque, Nm", title=plain(f"{file.name}: what the map covers")
     )
     axes.legend(loc="upper right")
-    return _png(figure)
+    return png(figure)
 
 
 def _doubts(axes: "Axes", imported: ImportedMap, envelope: Envelope) -> None:

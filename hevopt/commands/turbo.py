@@ -1,0 +1,244 @@
+"""`hevopt engine full-load` and `hevopt tipin`: the engine beyond its map."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from hevopt.commands.options import JsonOption
+from hevopt.commands.terminal import Progress, show, write
+from hevopt.errors import DataError
+
+if TYPE_CHECKING:
+    from hevopt.errors import HevoptError
+    from hevopt.tipin.case import Case
+    from hevopt.tipin.drive import Manoeuvre, TipIn
+
+engine_app = typer.Typer(help="The engine beyond its map.", rich_markup_mode=None)
+
+
+@engine_app.callback()
+def _engine() -> None:
+    """The engine beyond its map."""
+
+
+@engine_app.command("full-load")
+def full_load(
+    engine: Annotated[
+        str, typer.Argument(help="Name or file of an engine with a [mean_value] part.")
+    ] = "engine_diesel_1300",
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Draw the curve to this PNG file.")
+    ] = None,
+) -> None:
+    """The torque that full pedal settles to at each speed of the file's curve, with pressures and air."""
+    from hevopt.car_files.components import engine_of
+    from hevopt.car_files.engine import EngineFile
+    from hevopt.car_files.mean_value_parts import mean_value_of
+    from hevopt.files.lookup import find
+    from hevopt.files.toml import checked, read_contents
+    from hevopt.files.writing import check_outs, write_whole
+    from hevopt.mean_value.car import BENCH, model_of
+    from hevopt.mean_value.full_load import full_load as settled
+    from hevopt.output import full_load as output
+
+    path = find("architectures/components", engine, ".toml")
+    contents = read_contents(path)
+    diesel = mean_value_of(str(path), contents)
+    known = engine_of(checked(str(path), contents, EngineFile))
+    if plot is not None:
+        if plot.suffix.lower() != ".png":
+            raise DataError(f"--plot {plot}: choose a name that ends in .png")
+        check_outs({"--plot": plot}, [path])
+    with Progress() as progress:
+        found = settled(
+            model_of(diesel, BENCH),
+            known.full_load_speed_radps,
+            lambda done, total: progress("full load", done, total),
+        )
+    show(output.full_load_table(found, known))
+    write(output.NOTES)
+    if plot is not None:
+        write_whole(plot, output.full_load_figure(found, known))
+        write(f"plot written to {plot}")
+
+
+def tipin(
+    car: Annotated[
+        str, typer.Argument(help="Name or TOML file of an architecture.")
+    ] = "compact_1300",
+    speed_kmh: Annotated[float, typer.Option("--from", help="Constant speed before, km/h.")] = 40.0,
+    gear: Annotated[int, typer.Option("--gear", help="Gear engaged.")] = 4,
+    smoke: Annotated[
+        str | None,
+        typer.Option("--smoke", help="Least lambda of the smoke limit, such as 1.1,1.25,1.4."),
+    ] = None,
+    turbo_inertia: Annotated[
+        str | None,
+        typer.Option("--turbo-inertia", help="Factors of the turbocharger's inertia: 0.5,2."),
+    ] = None,
+    final_drive: Annotated[
+        str | None, typer.Option("--final-drive", help="Final drive ratios, such as 3.2,4.3.")
+    ] = None,
+    gear_ratio: Annotated[
+        str | None,
+        typer.Option("--gear-ratio", help="Ratios of the gear engaged, such as 0.9,1.1."),
+    ] = None,
+    egr: Annotated[
+        str | None,
+        typer.Option("--egr", help="Factors of the recirculation valve's opening; 0: closed."),
+    ] = None,
+    e_boost: Annotated[
+        bool, typer.Option("--e-boost", help="One more case: the car's machine fills the hole.")
+    ] = False,
+    integrator: Annotated[
+        Literal["rk4", "lsoda"],
+        typer.Option(
+            "--integrator", help="rk4 with a fixed step, or lsoda, which chooses its own."
+        ),
+    ] = "rk4",
+    step_ms: Annotated[float, typer.Option("--step", help="Step of rk4, ms.")] = 0.25,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Any key of the car by its path, such as engine.mean_value.exhaust_wall.gas_wpk=0; repeatable.",
+        ),
+    ] = None,
+    json: JsonOption = False,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="Write a page to this HTML file.")
+    ] = None,
+) -> None:
+    """The pedal to the floor at constant speed: mean-value engine beside steady map, and what changes it.
+
+    Each list gives cases of its own, laid over the car as it is.
+    """
+    lists = {
+        "smoke": smoke, "turbo_inertia": turbo_inertia, "final_drive": final_drive,
+        "gear_ratio": gear_ratio, "egr": egr,
+    }  # fmt: skip
+    manoeuvre = _manoeuvre(car, changes, speed_kmh, gear, step_ms, integrator)
+    cases = _cases(lists, e_boost)
+    if report is not None:
+        _check_page(report, manoeuvre)
+    found, failed = _driven(manoeuvre, cases)
+    if json:
+        _print_json(found, failed)
+    else:
+        _print(manoeuvre, found, failed)
+    if report is not None:
+        _write_page(report, manoeuvre, found, failed)
+    if failed:
+        raise typer.Exit(4)
+
+
+def _manoeuvre(
+    car: str, changes: list[str] | None, speed_kmh: float, gear: int, step_ms: float,
+    integrator: Literal["rk4", "lsoda"],
+) -> "Manoeuvre":  # fmt: skip
+    from hevopt.car_files.load import load_architecture
+    from hevopt.car_files.mean_value_parts import mean_value_of
+    from hevopt.studies.study_file import assignments
+    from hevopt.tipin.drive import Manoeuvre
+
+    if not 1 <= speed_kmh <= 400:
+        raise DataError(f"--from {speed_kmh:g}; allowed: 1 to 400 km/h")
+    given = assignments(changes or [])
+    architecture = load_architecture(car, given)
+    place = f"{architecture.source}, engine"
+    diesel = mean_value_of(place, architecture.contents["engine"])
+    return Manoeuvre(architecture, diesel, speed_kmh / 3.6, gear, step_ms / 1e3, integrator, given)
+
+
+def _cases(lists: dict[str, str | None], e_boost: bool) -> "list[Case]":
+    from hevopt.tipin.case import BASE, Case, variation
+
+    cases = [BASE]
+    for name, text in lists.items():
+        option = f"--{name.replace('_', '-')}"
+        cases += [variation(name, value) for value in _numbers(option, text)]
+    return [*cases, Case("e-boost", assist=True)] if e_boost else cases
+
+
+def _numbers(option: str, text: str | None) -> list[float]:
+    from hevopt.files.shown import shown
+
+    try:
+        return [float(part) for part in (text or "").split(",") if part.strip()]
+    except ValueError:
+        raise DataError(
+            f"{option} {shown(text)}; needed: numbers separated by commas, such as 0.5,1,2"
+        ) from None
+
+
+def _driven(
+    manoeuvre: "Manoeuvre", cases: "list[Case]"
+) -> "tuple[list[TipIn], dict[str, HevoptError]]":
+    """Every case driven, the first as the car is; that one's failure is the command's."""
+    from hevopt.errors import HevoptError
+    from hevopt.tipin.drive import TipIn, tip_ins
+
+    with Progress() as progress:
+        found = tip_ins(manoeuvre, cases, progress)
+    if isinstance(found[0], HevoptError):
+        raise found[0]
+    driven = [one for one in found if isinstance(one, TipIn)]
+    failed = {
+        case.label: one
+        for case, one in zip(cases, found, strict=True)
+        if isinstance(one, HevoptError)
+    }
+    return driven, failed
+
+
+def _print(manoeuvre: "Manoeuvre", found: "list[TipIn]", failed: "dict[str, HevoptError]") -> None:
+    from hevopt.output import tipin_tables as tables
+    from hevopt.tipin.drive import titled
+
+    show(tables.feel_table(found, titled(manoeuvre)))
+    show(tables.engine_table(found))
+    if any(tip_in.assist for tip_in in found):
+        show(tables.assist_table(found))
+    write(tables.start_text(found[0]))
+    write(tables.notes(found))
+    for label, error in failed.items():
+        write(f"{label}: {error}")
+
+
+def _print_json(found: "list[TipIn]", failed: "dict[str, HevoptError]") -> None:
+    from json import dumps
+
+    from hevopt.output.tipin_tables import as_dict
+
+    told: dict[str, Any] = {"cases": [as_dict(tip_in) for tip_in in found]}
+    told["failed"] = {label: str(error) for label, error in failed.items()}
+    write(dumps(told, indent=1, allow_nan=False))
+
+
+def _check_page(report: Path, manoeuvre: "Manoeuvre") -> None:
+    from hevopt.files.writing import check_outs
+
+    if report.suffix.lower() not in (".html", ".htm"):
+        raise DataError(f"--report {report}: choose a name that ends in .html")
+    check_outs({"--report": report}, manoeuvre.architecture.files)
+
+
+def _write_page(
+    report: Path,
+    manoeuvre: "Manoeuvre",
+    found: "list[TipIn]",
+    failed: "dict[str, HevoptError]",
+) -> None:
+    import shlex
+    import sys
+
+    from hevopt.files.writing import write_whole
+    from hevopt.pages.tipin.page import tipin_page
+    from hevopt.tipin.bands import bands_of
+
+    command = shlex.join(["hevopt", *sys.argv[1:]])
+    page = tipin_page(manoeuvre, found, failed, bands_of(manoeuvre, found[0].figures), command)
+    write_whole(report, page.encode())
+    write(f"page written to {report}")
