@@ -12,7 +12,7 @@ from hevopt.bounds.prices import end_slack_j
 from hevopt.bounds.step_prices import costate_dual, dual_of_shape
 from hevopt.problem import battery as battery_model
 from hevopt.strategies import dp
-from hevopt.strategies._rollout_kernels import Penalty, _shift
+from hevopt.strategies._backward_kernels import Penalty, _shift
 
 
 @pytest.mark.parametrize("slope", [5e-324, 1e-300, 1e-19, 1e-12])

@@ -82,15 +82,12 @@ def compare(hevopt, tmp_path):
 def test_stopped_between_two_files_a_command_says_which_there_are(
     compare, monkeypatch, tmp_path, stop
 ):
-    whole = "hevopt.pages.comparison.results.Results.packed"
-    monkeypatch.setattr(whole, lambda self: b"x")
-
     def written(path, contents, write=write_whole):
         if path.name == "b.gz":
             raise stop
         write(path, contents)
 
-    monkeypatch.setattr("hevopt.files.writing.write_whole", written)
+    monkeypatch.setattr("hevopt.pages.comparison.compared.write_whole", written)
     seen = compare("--report", "a.html", "--save", "b.gz", "--out", "rows.csv")
     assert "written: a.html; not written: b.gz, rows.csv" in seen.err
     assert (tmp_path / "a.html").stat().st_size > 1000 and not (tmp_path / "rows.csv").exists()

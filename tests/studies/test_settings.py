@@ -412,7 +412,7 @@ def test_notes_say_what_an_asked_end_charge_means_and_when_there_is_no_reference
         ({"strategies": ["dp", "dp"]}, "'dp' is given twice"),
         ({"strategies": []}, "name at least one"),
         ({"strategies": "pd"}, "strategy 'pd' not found; close matches: dp"),
-        ({"strategies": 3}, "a list [...] is needed"),
+        ({"strategies": 3}, "a list of names and pairs"),
         ({"horizon_s": 10, "strategies": "dp"}, "no strategy asked for looks ahead"),
         ({"architectures": []}, "no architecture given"),
         ({"architectures": ["C2", "C2"]}, "is given twice"),
