@@ -150,7 +150,7 @@ def wheel_work(cycle: Cycle) -> dict[str, float]:
 
 
 def _parts_kg(name: str) -> float:
-    return load_architecture(name).contents["hybrid_mass_kg"]
+    return float(load_architecture(name).contents["hybrid_mass_kg"])
 
 
 def _work_mjpkm(car: Architecture, cycle: Cycle) -> float:

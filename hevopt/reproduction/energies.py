@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hevopt.bounds.certificate import certify
 from hevopt.problem.simulation import simulate
-from hevopt.reproduction.variations import Varied
+from hevopt.reproduction.variations import Varied, signals_of
 from hevopt.strategies import strategy_named
 from hevopt.units import litres_per_100km
 
@@ -41,7 +41,7 @@ def balance(shipped: Varied, rule: str) -> Balance:
     flows, table = trajectory.flows, problem.table
     wheel_w, fuel_w = flows["wheel_power_w"], flows["fuel_power_w"]
     engine_w = flows["engine_torque_nm"] * flows["engine_speed_radps"]
-    fired, standing = fuel_w > 0, table.signals.speed_mps == 0
+    fired, standing = fuel_w > 0, signals_of(problem).speed_mps == 0
 
     def sum_of(power_w: NDArray[np.float64]) -> float:
         return float(np.sum(power_w * table.step_s)) / cycle.distance_m

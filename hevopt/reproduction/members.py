@@ -44,7 +44,7 @@ def curve(
 def calibrated(shipped: Varied, base: Figures) -> Member:
     """The member of conventional that its own calibration takes, against `base`."""
     plan = conventional.solve(shipped.problem)
-    return _members(shipped, plan, base)[plan.notes["chosen"]]
+    return _members(shipped, plan, base)[int(plan.notes["chosen"])]
 
 
 def family(shipped: Varied, base: Figures) -> list[Member]:

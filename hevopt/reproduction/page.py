@@ -116,7 +116,7 @@ def _ranking(comparison: Comparison) -> str:
             change = {c: percent(getattr(of[c], key), getattr(base, key)) for c in HYBRIDS}
             order = " < ".join(sorted(HYBRIDS, key=lambda car: change[car]))
             rows.append([f"`{name}`", what, *(f"{signed(change[c])} %" for c in HYBRIDS), order])
-    gap = max(row.gap_percent for row in comparison.rows if row.strategy == "dp")
+    gap = max(row.gap_percent or 0.0 for row in comparison.rows if row.strategy == "dp")
     heads = ["strategy", "change of", *HYBRIDS, "from least to most"]
     return (
         "## Ranking\n\n" + markdown(heads, "ll" + "r" * len(HYBRIDS) + "l", rows)
@@ -126,8 +126,12 @@ def _ranking(comparison: Comparison) -> str:
 
 
 def _ranked(comparison: Comparison, strategy: str) -> list[str]:
-    rows = [row for row in comparison.rows if row.strategy == strategy]
-    return [r.architecture for r in sorted(rows, key=lambda r: r.fuel_corrected_l_per_100km)]
+    fuel = {
+        row.architecture: row.fuel_corrected_l_per_100km
+        for row in comparison.rows
+        if row.strategy == strategy and row.fuel_corrected_l_per_100km is not None
+    }
+    return sorted(fuel, key=lambda car: fuel[car])
 
 
 def _wheel_work(found: Reproduction) -> str:

@@ -43,7 +43,7 @@ def anchor(section: int) -> str:
 def fuel_of_b(found: Reproduction) -> str:
     """Section 1."""
     b = load_architecture("B")
-    machine, battery = b.machines[0].loss.efficiency, b.battery.coulombic_efficiency
+    machine, battery = v.machine_efficiency(b), b.battery.coulombic_efficiency
     losses = [
         f"x {factor:g} makes them {v.less_loss(machine, factor):g} and "
         f"{v.less_loss(battery, factor):g}"

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.machine_laws import LossByEfficiency
 from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
 from hevopt.problem.reject import Reject
+from hevopt.problem.table import Signals
 from hevopt.units import KMH_PER_MPS
 
 LOSS_FACTOR, LESS_LOSS_FACTOR, RESISTANCE_FACTOR, HYBRID_MASS_FACTOR = 1.5, 0.5, 2.0, 2.0
@@ -66,23 +68,35 @@ def varied(architecture: str, cycle: Cycle, variation: Variation) -> Varied:
     problem = variation.problem(built)
     touched = (
         car.contents != shipped.contents
-        or not np.array_equal(changed.gear, cycle.gear)
+        or not np.array_equal(listed_gear(changed), listed_gear(cycle))
         or not np.array_equal(problem.table.reject, built.table.reject)
     )
     return Varied(car, changed, problem, touched)
 
 
+def listed_gear(cycle: Cycle) -> NDArray[np.int64]:
+    """The gears of a cycle that lists them, as the study's does."""
+    assert cycle.gear is not None
+    return cycle.gear
+
+
+def signals_of(problem: Problem) -> Signals:
+    """What the cycle asks at each step; a problem of a car has it."""
+    assert problem.table.signals is not None
+    return problem.table.signals
+
+
 def neutral_at_standstill(cycle: Cycle) -> Cycle:
     """The cycle with no gear engaged while the car stands: the engine may rest until it moves off."""
     standing = np.append(cycle.speed_mps[1:] + cycle.speed_mps[:-1] == 0, False)
-    return replace(cycle, gear=np.where(standing, 0, cycle.gear))
+    return replace(cycle, gear=np.where(standing, 0, listed_gear(cycle)))
 
 
 def electric_up_to(limit_kmh: float) -> Callable[[Problem], Problem]:
     """Leaves no driving without fuel above a speed."""
 
     def limited(problem: Problem) -> Problem:
-        signals = problem.table.signals
+        signals = signals_of(problem)
         fast = (signals.speed_mps * KMH_PER_MPS > limit_kmh) & (signals.wheel_power_w > 0)
         return without(problem, fast[:, None] & (problem.table.fuel_kg == 0))
 
@@ -93,7 +107,7 @@ def braking_share(share: float) -> Callable[[Problem], Problem]:
     """Leaves the machine no more than a share of the wheels' braking power; the brakes take the rest."""
 
     def limited(problem: Problem) -> Problem:
-        flows, wheel_w = problem.table.flows, problem.table.signals.wheel_power_w[:, None]
+        flows, wheel_w = problem.table.flows, signals_of(problem).wheel_power_w[:, None]
         taken_w = -flows["machine_power_w"]
         return without(problem, (wheel_w < 0) & (taken_w > np.maximum(-share * wheel_w, 0)))
 
@@ -103,12 +117,14 @@ def braking_share(share: float) -> Callable[[Problem], Problem]:
 def without(problem: Problem, unwanted: NDArray[np.bool_]) -> Problem:
     """The problem with (time, control) controls taken away, but at steps where none would be left."""
     table = problem.table
-    left = (table.feasible & ~unwanted).any(axis=1)
+    left = np.any(table.feasible & ~unwanted, axis=1)
     bits = np.where(unwanted & left[:, None], np.uint16(Reject.FUNCTION), np.uint16(0))
     return replace(problem, table=replace(table, reject=table.reject | bits))
 
 
-def _times(car: Architecture, component: str, keys: tuple[str, ...], factor: float) -> dict:
+def _times(
+    car: Architecture, component: str, keys: tuple[str, ...], factor: float
+) -> dict[str, float]:
     table = car.contents[component]
     return {f"{component}.{key}": factor * table[key] for key in keys if key in table}
 
@@ -135,6 +151,13 @@ def _charging_loss(factor: float) -> Callable[[Architecture], dict[str, float]]:
     }
 
 
+def machine_efficiency(car: Architecture) -> float:
+    """That of a car whose machine's file gives one efficiency."""
+    loss = car.machines[0].loss
+    assert isinstance(loss, LossByEfficiency)
+    return loss.efficiency
+
+
 def less_loss(efficiency: float, factor: float) -> float:
     """The efficiency whose distance from 1 is `factor` times as large."""
     return 1 - factor * (1 - efficiency)
@@ -151,7 +174,7 @@ def _driveline(car: Architecture) -> dict[str, float]:
 def _alternator_as_belt(car: Architecture) -> dict[str, float]:
     if car.driveline.kind != "none":
         return {}
-    return {"machine.efficiency": load_architecture("B").machines[0].loss.efficiency}
+    return {"machine.efficiency": machine_efficiency(load_architecture("B"))}
 
 
 def _road(car: Architecture) -> dict[str, float]:

@@ -6,6 +6,7 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache
 from time import monotonic
+from typing import Any
 
 from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError
@@ -228,18 +229,14 @@ def _pruned(course: _Course) -> None:
             solved.setdefault(case.design, {}).setdefault(case.cycle, []).append(case.key)
     course.run(key for keys in bounds.values() for key in keys)
     rows = store.rows(key for keys in bounds.values() for key in keys)
-    figures = {key: row and row.get("bound_l_per_100km") for key, row in rows}
+    figures = {key: _figure_of(row, "bound_l_per_100km") for key, row in rows}
     weights = {case.design: case.nox_weight for case in plan.planned}
     waves = search(
         Bounded(design, weights[design], mean_bound([figures[key] for key in keys]))
         for design, keys in bounds.items()
     )
-    objectives = None
-    while True:
-        try:
-            wave = waves.send(objectives)
-        except StopIteration:
-            return
+    wave = next(waves, None)
+    while wave is not None:
         spared = {
             pruned: course.missing.intersection(_all(solved[pruned.design]))
             for pruned in wave.pruned
@@ -252,6 +249,14 @@ def _pruned(course: _Course) -> None:
         progress.pruned += len(gone)
         course.run(key for design in wave.designs for key in _all(solved[design]))
         objectives = {design: _objective(store, solved[design]) for design in wave.designs}
+        try:
+            wave = waves.send(objectives)
+        except StopIteration:
+            wave = None
+
+
+def _figure_of(row: Mapping[str, Any] | None, name: str) -> float | None:
+    return None if row is None else row.get(name)
 
 
 def _all(cycles: dict[str, list[str]]) -> list[str]:
@@ -262,5 +267,5 @@ def _objective(store: Store, cycles: dict[str, list[str]]) -> float | None:
     rows = dict(store.rows(_all(cycles)))
     if not follows(rows.values()):
         return None
-    figures = {key: row and row.get("objective_l_per_100km") for key, row in rows.items()}
+    figures = {key: _figure_of(row, "objective_l_per_100km") for key, row in rows.items()}
     return mean_objective([[figures[key] for key in keys] for keys in cycles.values()])

@@ -71,7 +71,7 @@ class Constraint:
     def holds(self, values: Values) -> bool:
         """Whether a design meets it; DataError where its arithmetic has no result."""
         try:
-            return self.part(values)
+            return bool(self.part(values))
         except (ZeroDivisionError, OverflowError, ValueError) as error:
             at = ", ".join(f"{printable(n)} = {shown(values[n])}" for n in sorted(self.names))
             raise DataError(
@@ -127,10 +127,10 @@ def _tree(text: str) -> tuple[ast.expr, dict[str, str]]:
     """The syntax tree with a placeholder for each parameter, and placeholder -> parameter."""
     names: dict[str, str] = {}
 
-    def replaced(match: re.Match) -> str:
+    def replaced(match: re.Match[str]) -> str:
         name = match["name"]
         if name is None or name in _WORDS:
-            return match[0]
+            return str(match[0])
         known = {known: placeholder for placeholder, known in names.items()}
         placeholder = known.get(name, _PLACEHOLDER.format(len(names)))
         names[placeholder] = name
@@ -148,7 +148,8 @@ def _tree(text: str) -> tuple[ast.expr, dict[str, str]]:
 
 
 def _depth(tree: ast.expr) -> int:
-    depth, level = 0, [tree]
+    depth = 0
+    level: list[ast.AST] = [tree]
     while level and depth <= _DEPTH_MAX:
         depth += 1
         level = [child for node in level for child in ast.iter_child_nodes(node)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 from math import ceil, floor, log2, prod
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,11 @@ class Designs(Sequence[Design], Shown):
     def __len__(self) -> int:
         return len(self.codes)
 
-    def __getitem__(self, number):
+    @overload
+    def __getitem__(self, number: int) -> Design: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[Design]: ...
+    def __getitem__(self, number: int | slice) -> Design | list[Design]:
         if isinstance(number, slice):
             return [self[n] for n in range(*number.indices(len(self)))]
         row = self.codes[number].tolist()
@@ -142,8 +146,8 @@ def _levels(values: Values) -> tuple[Scalar, ...]:
     """The values of a list, or of a range with a count: after rounding, each once."""
     if not isinstance(values, Range):
         return values
-    steps = values.count - 1
-    return tuple(dict.fromkeys(values.at(n, steps) for n in range(values.count)))
+    number = values.count or 1
+    return tuple(dict.fromkeys(values.at(n, number - 1) for n in range(number)))
 
 
 def _combinations(study: SweepStudy) -> tuple[tuple[tuple[Scalar, ...], ...], NDArray[np.int32]]:
@@ -177,9 +181,13 @@ def _unit_sample(sample: SampleFile, dimensions: int) -> NDArray[np.float64]:
     from scipy.stats import qmc
 
     if sample.method == "latin_hypercube":
-        return qmc.LatinHypercube(dimensions, seed=sample.seed).random(sample.count)
+        shares: NDArray[np.float64] = qmc.LatinHypercube(dimensions, seed=sample.seed).random(
+            sample.count
+        )
+        return shares
     powers = ceil(log2(sample.count))
-    return qmc.Sobol(dimensions, seed=sample.seed).random_base2(powers)[: sample.count]
+    points: NDArray[np.float64] = qmc.Sobol(dimensions, seed=sample.seed).random_base2(powers)
+    return points[: sample.count]
 
 
 def _column(
@@ -194,8 +202,8 @@ def _column(
         count = len(levels)
         return levels, np.array([min(floor(s * count), count - 1) for s in shares])
     if values.whole and not values.log:
-        count = values.high - values.low + 1
-        found = [min(values.low + floor(share * count), values.high) for share in shares]
+        whole = values.high - values.low + 1
+        found = [min(values.low + floor(share * whole), values.high) for share in shares]
     else:
         found = [values.at(share, 1.0) for share in shares]
     distinct, codes = np.unique(np.array(found), return_inverse=True)
@@ -232,4 +240,5 @@ def _places(levels: Sequence[Scalar]) -> NDArray[np.float64]:
     """Where values stand between their ends, 0 to 1; texts by their order in the list."""
     numbers = levels if isinstance(levels[0], int | float) else range(len(levels))
     values = np.array(numbers, dtype=float)
-    return (values - values.min()) / (values.max() - values.min())
+    places: NDArray[np.float64] = (values - values.min()) / (values.max() - values.min())
+    return places

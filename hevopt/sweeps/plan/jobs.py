@@ -146,12 +146,12 @@ def jobs_of(
     NOx where the engine has no data on it.
     """
     # Workers import this module too, and leave what solves to their processes.
-    from hevopt.strategies import STRATEGIES
+    from hevopt.strategies import STRATEGIES, Strategy
     from hevopt.studies.case import require_nox
 
     common = {"code": physics_digest(), "versions": versions(), "allow_shortfall": allow_shortfall}
     traces = {cycle: load_cycle(cycle) for cycle in cycles}
-    known = STRATEGIES | brought
+    known: dict[str, Strategy | Brought] = {**STRATEGIES, **brought}
     learning = {name for name in strategies if name in known and known[name].learns}
     teachers = [cycle_contents(cycle) for cycle in shipped_cycles()] if learning else None
     made_with = {name: [digest(teachers)] for name in learning}

@@ -34,7 +34,7 @@ def _kind(value: object) -> Kind | None:
 
 
 def _number(value: Any) -> int | float:
-    if _kind(value) != "number":
+    if not isinstance(value, int | float) or isinstance(value, bool):
         raise ValueError("a number is needed")
     if not abs(value) <= _NUMBER_MAX:
         raise ValueError(f"allowed: {-_NUMBER_MAX:g} to {_NUMBER_MAX:g}")
@@ -42,10 +42,11 @@ def _number(value: Any) -> int | float:
 
 
 _Number = Annotated[Any, AfterValidator(_number)]
-_Ends = create_model("_Ends", __base__=FileModel, **{"from": (_Number, ...), "to": (_Number, ...)})
+_ENDS: dict[str, Any] = {"from": (_Number, ...), "to": (_Number, ...)}
+_Ends: Any = create_model("_Ends", __base__=FileModel, **_ENDS)
 
 
-class RangeFile(_Ends):
+class RangeFile(_Ends):  # type: ignore[misc]
     """Numbers from one to another; whole ones where both ends are."""
 
     count: Annotated[int, Field(ge=2, le=DESIGNS_MAX)] | None = None
@@ -132,17 +133,18 @@ def _listed(values: Any) -> list[Scalar]:
         raise ValueError("entries must be all numbers, all texts in quotes, or all true or false")
     if kinds == {"number"}:
         values = [_number(value) for value in values]
+    listed: list[Scalar] = values
     seen: set[Scalar] = set()
-    for value in values:
+    for value in listed:
         if value in seen:
             raise ValueError(f"{shown(value)} is given twice; give it once")
         seen.add(value)
-    return values
+    return listed
 
 
 def kind_of(values: Values) -> Kind:
     """What a constraint may do with a parameter's values."""
-    return "number" if isinstance(values, Range) else _kind(values[0])
+    return "number" if isinstance(values, Range) else _kind(values[0]) or "text"
 
 
 def parameter_faults(load: Load, parameters: Mapping[str, Values]) -> Iterator[str]:
@@ -153,7 +155,8 @@ def parameter_faults(load: Load, parameters: Mapping[str, Values]) -> Iterator[s
     tried = {key: _telling(values) for key, values in parameters.items()}
     cars = {key: values for key, values in tried.items() if key != NOX_WEIGHT}
     for weight in tried.get(NOX_WEIGHT, ()):
-        if _kind(weight) != "number" or not 0 <= weight <= _NOX_WEIGHT_MAX:
+        number = isinstance(weight, int | float) and not isinstance(weight, bool)
+        if not (number and 0 <= float(weight) <= _NOX_WEIGHT_MAX):
             yield (
                 f"parameters.{NOX_WEIGHT} = {shown(weight)}; allowed: 0 to {_NOX_WEIGHT_MAX:g} kg fuel "
                 "per kg NOx"

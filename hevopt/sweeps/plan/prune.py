@@ -12,7 +12,7 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from math import fsum, inf, isfinite
-from typing import Any
+from typing import Any, TypeGuard
 
 from hevopt.studies.status import Status
 
@@ -66,7 +66,9 @@ def mean_objective(objectives: Sequence[Sequence[float | None]]) -> float | None
 
     Sums are rounded once: with bounds nowhere above the objectives, their mean is not above that of these.
     """
-    best = [min(filter(_usable, cycle), default=None) for cycle in objectives]
+    best = [
+        min((figure for figure in cycle if _usable(figure)), default=None) for cycle in objectives
+    ]
     return _mean(best)
 
 
@@ -132,11 +134,12 @@ def _bound(given: Bounded) -> float:
     return given.bound if _usable(given.bound) else -inf
 
 
-def _usable(value: float | None) -> bool:
+def _usable(value: float | None) -> TypeGuard[float]:
     return value is not None and isfinite(value)
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    if not values or not all(map(_usable, values)):
+    usable = [value for value in values if _usable(value)]
+    if not usable or len(usable) < len(values):
         return None
-    return fsum(values) / len(values)
+    return fsum(usable) / len(usable)

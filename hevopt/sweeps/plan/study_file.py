@@ -86,6 +86,7 @@ def read_study(path: str | Path) -> SweepStudy:
     """The study of a file; DataError with its faults, each with its place."""
     study, faults = study_and_faults(Path(path))
     _raise(Path(path), faults)
+    assert study is not None  # without a fault there is one
     return study
 
 
@@ -143,8 +144,9 @@ def _without_misplaced(contents: dict[str, Any]) -> list[str]:
     faults = []
     for table in ("sample", "parameters"):
         inner = contents.get(table)
-        fallen = [key for key in _OF_THE_FILE if isinstance(inner, dict) and key in inner]
-        for key in fallen:
+        if not isinstance(inner, dict):
+            continue
+        for key in [key for key in _OF_THE_FILE if key in inner]:
             faults.append(
                 f"{table}.{key}: {key} is a key of the whole file; write it above the first [table]"
             )
@@ -186,7 +188,8 @@ def _car(folder: Path, name: str | None, faults: list[str]) -> tuple[str, Archit
 
 def _cycles(folder: Path, names: Sequence[str], faults: list[str]) -> tuple[str, ...]:
     """The cycles' names or absolute paths."""
-    located, by_name = [], {}
+    located: list[str] = []
+    by_name: dict[str, dict[str, str]] = {}
     for name in names:
         try:
             located.append(_located("cycles", name, ".csv", folder))

@@ -94,7 +94,7 @@ def _lines(reader: Reader) -> Iterator[dict[str, Any]]:
         bound = next((r.row for r in records if r.strategy == BOUND and r.row is not None), {})
         for record in records:
             leading = design, record.cycle, record.strategy, str(record.ending)
-            line = dict(zip(_LEADING, leading, strict=True)) | record.parameters
+            line = {**dict(zip(_LEADING, leading, strict=True)), **record.parameters}
             line[NOX_WEIGHT] = record.nox_weight
             pruned = record.ending == Ending.PRUNED
             row = _unsolved(bound, condemned[design]) if pruned else record.row or {}

@@ -53,9 +53,9 @@ def _order(ranked: Ranked) -> tuple[bool, bool, float, int]:
 
 
 def _ranked(reader: Reader) -> Iterator[Ranked]:
-    for design, records in groupby(reader.records(), attrgetter("design")):
-        records = list(records)
-        cycles = [list(found) for _, found in groupby(records, attrgetter("cycle"))]
+    for design, found in groupby(reader.records(), attrgetter("design")):
+        records = list(found)
+        cycles = [list(of) for _, of in groupby(records, attrgetter("cycle"))]
         yield Ranked(
             design,
             records[0].parameters,
@@ -67,8 +67,9 @@ def _ranked(reader: Reader) -> Iterator[Ranked]:
 
 
 def _bound_of_best(records: Sequence[Record]) -> float | None:
-    solved = [r for r in records if _figure(r, "objective_l_per_100km") is not None]
-    chosen = min(solved, key=lambda r: r.row["objective_l_per_100km"]) if solved else records[0]
+    objectives = [_figure(record, "objective_l_per_100km") for record in records]
+    solved = [(figure, n) for n, figure in enumerate(objectives) if figure is not None]
+    chosen = records[min(solved)[1]] if solved else records[0]
     return _figure(chosen, "objective_bound_l_per_100km")
 
 

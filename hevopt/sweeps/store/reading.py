@@ -58,7 +58,7 @@ class Record:
 
 def inputs_in(meta: Mapping[str, str]) -> dict[str, str]:
     """File -> SHA-256, of the files that a sweep was made from, by what its store knows of it."""
-    return json.loads(meta.get("inputs", "{}"))
+    return dict(json.loads(meta.get("inputs", "{}")))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Why cases of a sweep have no result, or lack a proof: reasons alike but for their numbers as one."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hevopt.files.shown import printable
@@ -33,6 +34,6 @@ class Reasons:
         found = [reason for (about, _), reason in self._found.items() if about == of]
         return sorted(found, key=lambda reason: -reason.count)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         """What they are of."""
         return iter(dict.fromkeys(of for of, _ in self._found))

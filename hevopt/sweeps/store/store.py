@@ -148,7 +148,7 @@ class Store:
         """How many results belong to no planned case."""
         query = "SELECT count(*) FROM cases WHERE key NOT IN (SELECT key FROM plan)"
         with told(self.path):
-            return self._connection.execute(query).fetchone()[0]
+            return int(self._connection.execute(query).fetchone()[0])
 
     def rows(self, keys: Iterable[str]) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """Key and row of each of some cases; None where there is none."""

@@ -5,7 +5,7 @@ from functools import reduce
 from operator import or_
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, Literal, Self, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
@@ -53,14 +53,18 @@ def _field(hint: Any) -> Any:
     return (allowed, None) if NoneType in kinds else allowed
 
 
-_AnyRow = create_model(
+if TYPE_CHECKING:
+    _Ending = str
+else:
+    _Ending = Literal[tuple(map(str, Ending))]
+_AnyRow: Any = create_model(
     "_AnyRow",
     __base__=_Fields,
     **{name: _field(hint) for name, hint in get_type_hints(Row).items()},
 )
 
 
-class _StoredRow(_AnyRow):
+class _StoredRow(_AnyRow):  # type: ignore[misc]
     """The figures of a row, None for those it does not have; keys of other versions are passed over."""
 
     model_config = ConfigDict(extra="ignore")
@@ -82,7 +86,7 @@ class _StoredCase(_Fields):
     cycle: _Name
     strategy: _Name
     nox_weight: Annotated[float, Field(ge=0, le=_WEIGHT_MAX)]
-    ending: Literal[tuple(map(str, Ending))]
+    ending: _Ending
     row: _StoredRow | None
     failure: _StoredFailure | None
     seconds: Annotated[float, Field(ge=0, le=_NUMBER_MAX)] | None
@@ -145,7 +149,11 @@ def check_case(path: Path, values: Mapping[str, Any], keys: Sequence[str] | None
 
 def known_figures(row: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """A row without the keys of other versions."""
-    return row and {name: value for name, value in row.items() if name in _StoredRow.model_fields}
+    return (
+        None
+        if row is None
+        else {name: value for name, value in row.items() if name in _StoredRow.model_fields}
+    )
 
 
 def check_pruned(path: Path, values: Mapping[str, Any]) -> None:

@@ -14,7 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import resource_tracker
-from typing import Any
+from typing import Any, cast
 
 from loky.backend import resource_tracker as loky_tracker
 
@@ -31,7 +31,7 @@ _CLOSE_S = 15.0
 # Pools that may end one after the other without a single outcome in between.
 _LOSSES_MAX = 5
 
-Run = Callable[[Iterable[Job]], Iterator[list[Outcome]]]
+Run = Callable[[Iterable[Job]], Generator[list[Outcome], None, None]]
 
 
 @contextmanager
@@ -107,12 +107,12 @@ class _Server:
     """
 
     def __init__(self) -> None:
-        self._calls: queue.SimpleQueue = queue.SimpleQueue()
+        self._calls: queue.SimpleQueue[Any] = queue.SimpleQueue()
         threading.Thread(target=self._serve, name="hevopt-sweep", daemon=True).start()
 
-    def call(self, function: Callable[..., Any], *arguments: Any) -> Future:
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """What a function will have returned."""
-        done: Future = Future()
+        done: Future[Any] = Future()
         self._calls.put((done, partial(function, *arguments)))
         return done
 
@@ -140,10 +140,10 @@ class _Team:
     ) -> None:
         self._open, self._terms, self._notice, self._own = open_one, terms, notice, own
         self._server = _Server()
-        self._opened: Future | None = None
+        self._opened: Future[Any] | None = None
         self._losses, self._loss = 0, ""
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[list[Outcome]]:
+    def run(self, jobs: Iterable[Job]) -> Generator[list[Outcome], None, None]:
         """Lists of outcomes, as `workers` says."""
         tasks = _Tasks(jobs)
         while (fault := (yield from self._attempt(tasks))) is not None:
@@ -156,7 +156,7 @@ class _Team:
     def _attempt(self, tasks: _Tasks) -> Generator[list[Outcome], None, BaseException | None]:
         """Runs tasks until none is left, or one is lost: then why."""
         pool = yield from self._pool()
-        sent: dict[Future, int] = {}
+        sent: dict[Future[Any], int] = {}
         fault = None
         try:
             while fault is None:
@@ -190,12 +190,13 @@ class _Team:
             none = "and no other could" if self._losses else "no worker can"
             raise WorkersLost(f"{self._loss}{none} be started: {first_line(fault)}")
         _hear_signals()
-        return opened.result()
+        pool: Pool = opened.result()
+        return pool
 
-    def _send(self, pool: Pool, number: int, jobs: list[Job]) -> Future:
+    def _send(self, pool: Pool, number: int, jobs: list[Job]) -> Future[Any]:
         sent = self._server.call(pool.send, partial(_answer_of, self._terms, jobs))
         fault = _fault_of(sent)
-        return sent if fault else sent.result()
+        return sent if fault else cast("Future[Any]", sent.result())
 
     def _answer(
         self, tasks: _Tasks, number: int, answer: list[Outcome] | HevoptError
@@ -245,7 +246,7 @@ def _answer_of(terms: Terms, jobs: list[Job]) -> list[Outcome] | HevoptError:
         return error
 
 
-def _fault_of(future: Future) -> BaseException | None:
+def _fault_of(future: Future[Any]) -> BaseException | None:
     """What a call raised, waited for."""
     try:
         return future.exception()

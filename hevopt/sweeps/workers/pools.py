@@ -27,7 +27,7 @@ _CONNECT_S = 20.0
 class Pool:
     """send: puts a call on its way; workers: how many run at a time; window: how many to have on their way."""
 
-    send: Callable[[Callable[[], Any]], Future]
+    send: Callable[[Callable[[], Any]], Future[Any]]
     workers: int
     window: int
     close: Callable[[], None]
@@ -92,7 +92,7 @@ def cores() -> int:
     """How many cores this process may use."""
     from loky import cpu_count
 
-    return cpu_count()
+    return int(cpu_count())
 
 
 def _loky(workers: int | None, _: str | None) -> Pool:
@@ -125,16 +125,16 @@ def _dask(workers: int | None, scheduler: str | None) -> Pool:
 
     count = sum(client.nthreads().values())
     limited = min(workers or count, count)
-    kept: dict[Future, Any] = {}
+    kept: dict[Future[Any], Any] = {}
 
-    def send(call: Callable[[], Any]) -> Future:
-        done: Future = Future()
+    def send(call: Callable[[], Any]) -> Future[Any]:
+        done: Future[Any] = Future()
         # Its arguments travel with the task, so that no worker's end loses them. A future let go is cancelled.
         kept[done] = future = client.submit(call, pure=False)
         future.add_done_callback(lambda found: settle(done, found))
         return done
 
-    def settle(done: Future, found: Any) -> None:
+    def settle(done: Future[Any], found: Any) -> None:
         try:
             done.set_result(found.result())
         except BaseException as error:
@@ -175,8 +175,9 @@ def _ray(workers: int | None, scheduler: str | None) -> Pool:
     run = ray.remote(num_cpus=1, max_retries=3)(_called)
     limited = min(workers or count, count)
 
-    def send(call: Callable[[], Any]) -> Future:
-        return run.remote(call).future()
+    def send(call: Callable[[], Any]) -> Future[Any]:
+        future: Future[Any] = run.remote(call).future()
+        return future
 
     return Pool(send, limited, limited if workers and scheduler else 2 * limited, ray.shutdown)
 

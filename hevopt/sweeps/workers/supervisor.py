@@ -68,14 +68,14 @@ _kept = threading.local()
 
 def _process(terms: Terms) -> "_Process":
     """This thread's process, a new one where there is none that runs to these terms."""
-    process = getattr(_kept, "process", None)
+    process: _Process | None = getattr(_kept, "process", None)
     if process is not None and process.terms == terms and process.alive():
         return process
     drop_process()
     for attempt in range(_STARTS_MAX):
         try:
-            _kept.process = _Process(terms)
-            return _kept.process
+            _kept.process = started = _Process(terms)
+            return started
         except _NotStarted as error:
             fault = f"{error}, {attempt + 1} times"
     raise CannotStart(fault)
@@ -177,7 +177,7 @@ def python_path() -> str:
     return os.pathsep.join(path for path in sys.path if path)
 
 
-def _end(running: subprocess.Popen, pipe: Connection, errors: IO[bytes]) -> None:
+def _end(running: subprocess.Popen[bytes], pipe: Connection, errors: IO[bytes]) -> None:
     running.kill()
     running.wait()
     pipe.close()
