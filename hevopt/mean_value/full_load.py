@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.mean_value import states as s
 from hevopt.mean_value._run_kernels import observe
 from hevopt.mean_value.parameters import Model
@@ -14,8 +15,8 @@ from hevopt.mean_value.settle import held, steady_state
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FullLoad:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FullLoad(Shown):
     """Steady full load. speed_radps: (point,); states: (point, state); signals: name -> (point,)"""
 
     speed_radps: Array

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError, SolverError
 from hevopt.mean_value import states as s
 from hevopt.mean_value._run_kernels import TABLEAUX, march, observe, rates
@@ -22,8 +23,8 @@ _GUARD_EVERY_S = 1.0
 _LEAST_STEP_S = 1e-6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Run:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Run(Shown):
     """States over time. time_s: (sample,); states: (sample, state), see states.py; signals: name -> (sample,)"""
 
     model: Model

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.mean_value import states as s
 from hevopt.mean_value.parameters import ASSIST, Model, with_curve
@@ -25,8 +26,8 @@ _SPEEDS, _TORQUES = 400, 500
 _FASTEST_RADPS = 1e4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Helper:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Helper(Shown):
     """A machine of a car, by its place, as the wheels see it.
 
     limit_nm, by_machine_nm: (speed,) most torque by machine and battery, and by the machine alone, over its speed
@@ -40,8 +41,8 @@ class Helper:
     by_machine_nm: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Assist:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Assist(Shown):
     """What a machine did in the first 5 s, or until it was needed no more.
 
     filled: share of the torque hole of this very run that it filled, at the wheels

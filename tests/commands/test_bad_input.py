@@ -202,7 +202,7 @@ def test_harmless_oddities_of_a_cycle(hevopt, spoilt):
         ("x", "70.0", "9" * 5000, ["a number has too many digits"]),
         ("x", "70.0", "0x" + "f" * 5000, ["hybrid_mass_kg = a very long int"]),
         ("x", '"car_compact"', "5", ["car = 5", "text in quotes"]),
-        ("x", '"car_compact"', '"car_compct"', ["x.toml, car:", "close matches: car_compact;"]),
+        ("x", '"car_compact"', '"car_compct"', ["x.toml, car:", "close matches: car_compact, "]),
         ("x", '"car_compact"', '"no/car.toml"', ["x.toml, car:", "no/car.toml does not exist"]),
         ("x", '"car_compact"', '""', ["x.toml: car = ''", "1 or more characters"]),
         ("x", '"car_compact"', '"x.toml"', ["mass_kg is missing", "unknown key coupling"]),

@@ -228,11 +228,13 @@ def test_the_guard_refuses_a_millisecond_and_without_it_the_turbocharger_settles
     with pytest.raises(DataError, match=r"step 1 ms at t = 0 s is too long.*0\.\d+ ms or less"):
         simulate(model, y, 0.1, step_s=1e-3)
     assert 0.25e-3 < longest_step_s(0.0, y, model) < 1e-3
-    right, wrong = (
-        march(0.0, y, h, 1, round(5 / h), *TABLEAUX[4], model)[-1, s.TURBO] for h in (0.25e-3, 1e-3)
+    right, astray, wrong = (
+        march(0.0, y, h, 5, round(1 / h), *TABLEAUX[4], model)[:, s.TURBO] for h in (0.25e-3, 1e-3, 1.25e-3)
     )
     assert right == pytest.approx(y[s.TURBO], rel=1e-6)
-    assert np.isfinite(wrong) and wrong < 0.98 * right
+    # At 1 ms it wanders, where to depends on the machine's rounding; at 1.25 ms it is always low.
+    assert np.isfinite(astray).all() and np.abs(astray / y[s.TURBO] - 1).max() > 1e-3
+    assert np.isfinite(wrong).all() and wrong[-1] < 0.98 * y[s.TURBO]
 
 
 @pytest.mark.parametrize("step_ms", [0.3, 7.0, 0.0, -1.0, float("nan"), 1e-9])
