@@ -229,7 +229,8 @@ def test_the_guard_refuses_a_millisecond_and_without_it_the_turbocharger_settles
         simulate(model, y, 0.1, step_s=1e-3)
     assert 0.25e-3 < longest_step_s(0.0, y, model) < 1e-3
     right, astray, wrong = (
-        march(0.0, y, h, 5, round(1 / h), *TABLEAUX[4], model)[:, s.TURBO] for h in (0.25e-3, 1e-3, 1.25e-3)
+        march(0.0, y, h, 5, round(1 / h), *TABLEAUX[4], model)[:, s.TURBO]
+        for h in (0.25e-3, 1e-3, 1.25e-3)
     )
     assert right == pytest.approx(y[s.TURBO], rel=1e-6)
     # At 1 ms it wanders, where to depends on the machine's rounding; at 1.25 ms it is always low.
