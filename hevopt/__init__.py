@@ -41,6 +41,8 @@ _HOME = {
     "import_cycle": "hevopt.measured.cycles.cycle",
     "import_drives": "hevopt.measured.cycles.cycle",
     "import_map": "hevopt.measured.maps.component",
+    "tip_in_study": "hevopt.tipin.study",
+    "settled_full_load": "hevopt.tipin.study",
     "coastdown": "hevopt.measured.coastdown.coastdown",
     "HevoptError": "hevopt.errors",
     "DataError": "hevopt.errors",

@@ -10,9 +10,8 @@ from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
-    from hevopt.errors import HevoptError
-    from hevopt.tipin.case import Case
-    from hevopt.tipin.drive import Manoeuvre, TipIn
+    from hevopt.tipin.drive import Manoeuvre
+    from hevopt.tipin.study import TipInStudy
 
 engine_app = typer.Typer(help="The engine beyond its map.", rich_markup_mode=None)
 
@@ -32,30 +31,17 @@ def full_load(
     ] = None,
 ) -> None:
     """The torque that full pedal settles to at each speed of the file's curve, with pressures and air."""
-    from hevopt.car_files.components import engine_of
-    from hevopt.car_files.engine import EngineFile
-    from hevopt.car_files.mean_value_parts import mean_value_of
     from hevopt.files.lookup import find
-    from hevopt.files.toml import checked, read_contents
     from hevopt.files.writing import check_outs, write_whole
-    from hevopt.mean_value.car import BENCH, model_of
-    from hevopt.mean_value.full_load import full_load as settled
     from hevopt.output import full_load as output
+    from hevopt.tipin.study import settled_full_load
 
-    path = find("architectures/components", engine, ".toml")
-    contents = read_contents(path)
-    diesel = mean_value_of(str(path), contents)
-    known = engine_of(checked(str(path), contents, EngineFile))
     if plot is not None:
         if plot.suffix.lower() != ".png":
             raise DataError(f"--plot {plot}: choose a name that ends in .png")
-        check_outs({"--plot": plot}, [path])
+        check_outs({"--plot": plot}, [find("architectures/components", engine, ".toml")])
     with Progress() as progress:
-        found = settled(
-            model_of(diesel, BENCH),
-            known.full_load_speed_radps,
-            lambda done, total: progress("full load", done, total),
-        )
+        found, known = settled_full_load(engine, progress)
     show(output.full_load_table(found, known))
     write(output.NOTES)
     if plot is not None:
@@ -115,105 +101,65 @@ def tipin(
 
     Each list gives cases of its own, laid over the car as it is.
     """
+    from hevopt.studies.study_file import assignments
+    from hevopt.tipin.study import cases_of, manoeuvre_of, study_of
+
     lists = {
         "smoke": smoke, "turbo_inertia": turbo_inertia, "final_drive": final_drive,
         "gear_ratio": gear_ratio, "egr": egr,
     }  # fmt: skip
-    manoeuvre = _manoeuvre(car, changes, speed_kmh, gear, step_ms, integrator)
-    cases = _cases(lists, e_boost)
+    manoeuvre = manoeuvre_of(
+        car, speed_kmh / 3.6, gear, integrator=integrator, step_s=step_ms / 1e3,
+        changes=assignments(changes or []),
+    )  # fmt: skip
+    values = {name: _numbers(f"--{name.replace('_', '-')}", text) for name, text in lists.items()}
     if report is not None:
         _check_page(report, manoeuvre)
-    found, failed = _driven(manoeuvre, cases)
+    with Progress() as progress:
+        study = study_of(manoeuvre, cases_of(values, e_boost), progress)
     if json:
-        _print_json(found, failed)
+        _print_json(study)
     else:
-        _print(manoeuvre, found, failed)
+        _print(study)
     if report is not None:
-        _write_page(report, manoeuvre, found, failed)
-    if failed:
+        _write_page(report, study)
+    if study.failed:
         raise typer.Exit(4)
-
-
-def _manoeuvre(
-    car: str, changes: list[str] | None, speed_kmh: float, gear: int, step_ms: float,
-    integrator: Literal["rk4", "lsoda"],
-) -> "Manoeuvre":  # fmt: skip
-    from hevopt.car_files.load import load_architecture
-    from hevopt.car_files.mean_value_parts import mean_value_of
-    from hevopt.studies.study_file import assignments
-    from hevopt.tipin.drive import Manoeuvre
-
-    if not 1 <= speed_kmh <= 400:
-        raise DataError(f"--from {speed_kmh:g}; allowed: 1 to 400 km/h")
-    given = assignments(changes or [])
-    architecture = load_architecture(car, given)
-    place = f"{architecture.source}, engine"
-    diesel = mean_value_of(place, architecture.contents["engine"])
-    return Manoeuvre(architecture, diesel, speed_kmh / 3.6, gear, step_ms / 1e3, integrator, given)
-
-
-def _cases(lists: dict[str, str | None], e_boost: bool) -> "list[Case]":
-    from hevopt.tipin.case import BASE, Case, variation
-
-    cases = [BASE]
-    for name, text in lists.items():
-        option = f"--{name.replace('_', '-')}"
-        cases += [variation(name, value) for value in _numbers(option, text)]
-    return [*cases, Case("e-boost", assist=True)] if e_boost else cases
 
 
 def _numbers(option: str, text: str | None) -> list[float]:
     from hevopt.files.shown import shown
 
     try:
-        return [float(part) for part in (text or "").split(",") if part.strip()]
+        return [] if text is None else [float(part) for part in text.split(",")]
     except ValueError:
         raise DataError(
             f"{option} {shown(text)}; needed: numbers separated by commas, such as 0.5,1,2"
         ) from None
 
 
-def _driven(
-    manoeuvre: "Manoeuvre", cases: "list[Case]"
-) -> "tuple[list[TipIn], dict[str, HevoptError]]":
-    """Every case driven, the first as the car is; that one's failure is the command's."""
-    from hevopt.errors import HevoptError
-    from hevopt.tipin.drive import TipIn, tip_ins
-
-    with Progress() as progress:
-        found = tip_ins(manoeuvre, cases, progress)
-    if isinstance(found[0], HevoptError):
-        raise found[0]
-    driven = [one for one in found if isinstance(one, TipIn)]
-    failed = {
-        case.label: one
-        for case, one in zip(cases, found, strict=True)
-        if isinstance(one, HevoptError)
-    }
-    return driven, failed
-
-
-def _print(manoeuvre: "Manoeuvre", found: "list[TipIn]", failed: "dict[str, HevoptError]") -> None:
+def _print(study: "TipInStudy") -> None:
     from hevopt.output import tipin_tables as tables
     from hevopt.tipin.drive import titled
 
-    show(tables.feel_table(found, titled(manoeuvre)))
+    found = study.found
+    show(tables.feel_table(found, titled(study.manoeuvre)))
     show(tables.engine_table(found))
     if any(tip_in.assist for tip_in in found):
         show(tables.assist_table(found))
     write(tables.start_text(found[0]))
     write(tables.notes(found))
-    for label, error in failed.items():
+    for label, error in study.failed.items():
         write(f"{label}: {error}")
 
 
-def _print_json(found: "list[TipIn]", failed: "dict[str, HevoptError]") -> None:
+def _print_json(study: "TipInStudy") -> None:
     from json import dumps
 
     from hevopt.output.tipin_tables import as_dict
 
-    told: dict[str, Any] = {"cases": [as_dict(tip_in) for tip_in in found]}
-    told["failed"] = {label: str(error) for label, error in failed.items()}
+    told: dict[str, Any] = {"cases": [as_dict(tip_in) for tip_in in study.found]}
+    told["failed"] = {label: str(error) for label, error in study.failed.items()}
     write(dumps(told, indent=1, allow_nan=False))
 
 
@@ -225,12 +171,7 @@ def _check_page(report: Path, manoeuvre: "Manoeuvre") -> None:
     check_outs({"--report": report}, manoeuvre.architecture.files)
 
 
-def _write_page(
-    report: Path,
-    manoeuvre: "Manoeuvre",
-    found: "list[TipIn]",
-    failed: "dict[str, HevoptError]",
-) -> None:
+def _write_page(report: Path, study: "TipInStudy") -> None:
     import shlex
     import sys
 
@@ -238,7 +179,9 @@ def _write_page(
     from hevopt.pages.tipin.page import tipin_page
     from hevopt.tipin.bands import bands_of
 
+    manoeuvre, found = study.manoeuvre, study.found
     command = shlex.join(["hevopt", *sys.argv[1:]])
-    page = tipin_page(manoeuvre, found, failed, bands_of(manoeuvre, found[0].figures), command)
+    bands = bands_of(manoeuvre, found[0].figures)
+    page = tipin_page(manoeuvre, found, study.failed, bands, command)
     write_whole(report, page.encode())
     write(f"page written to {report}")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
+from hevopt.display.facts import Shown
 from hevopt.errors import HevoptError
 from hevopt.mean_value import states as s
 from hevopt.mean_value.car import car_in_gear, cruise, model_of
@@ -27,9 +28,9 @@ Array = NDArray[np.float64]
 PEDAL_PER_S, DURATION_S = 10.0, 8.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TipIn:
-    """A driven case. assist: what the machine did, where one helped"""
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TipIn(Shown):
+    """A driven case, and the same car by its steady map. assist: what the machine did, where one helped"""
 
     case: Case
     run: Run
@@ -38,8 +39,8 @@ class TipIn:
     assist: Assist | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Manoeuvre:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Manoeuvre(Shown):
     """What all cases of a study share. changes: key path -> value with which the car was read"""
 
     architecture: Architecture
@@ -103,9 +104,11 @@ def tip_ins(
         except HevoptError as error:
             return error
 
-    found = []
+    found: list[TipIn | HevoptError] = []
+    progress(cases[0].label, 0, len(cases))
     with ThreadPoolExecutor(max_workers=cpu_count()) as threads:
         for n, done in enumerate(threads.map(one, cases), start=1):
             found.append(done)
-            progress(cases[min(n, len(cases) - 1)].label, n, len(cases))
+            if n < len(cases):
+                progress(cases[n].label, n, len(cases))
     return found

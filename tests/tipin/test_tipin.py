@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diesels import shipped
 
-from hevopt import DataError, HevoptError, load_architecture
+from hevopt import DataError, HevoptError, load_architecture, tip_in_study
 from hevopt.car_files.mean_value_parts import mean_value_of
 from hevopt.mean_value import states as s
 from hevopt.mean_value.parameters import Diesel
@@ -197,3 +197,12 @@ def test_values_that_are_none_are_one_message(name, value):
     option = f"--{name.replace('_', '-')}"
     with pytest.raises(DataError, match=f"{option} .*; allowed: .* to .*; give such values"):
         variation(name, value)
+
+
+def test_from_python_a_study_is_the_command_s(base):
+    study = tip_in_study(turbo_inertia=[2.0], final_drive=[1.5])
+    assert [t.case.label for t in study.found] == ["as shipped", "turbo inertia x 2"]
+    assert study.found[0].figures == base.figures
+    assert list(study.failed) == ["final drive 1.5"]
+    with pytest.raises(DataError, match="gear 9 of a tip-in"):
+        tip_in_study(gear=9)
