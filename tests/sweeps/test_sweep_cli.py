@@ -153,7 +153,7 @@ def test_a_dry_run_tells_what_would_run_and_stores_nothing(tmp_path, monkeypatch
 
 def test_infeasible_designs_are_results_and_failed_ones_are_not(tmp_path, monkeypatch, capsys):
     study = write_study(tmp_path, 2, 2)
-    # The first case of a process, which loads and compiles, has a minute more.
+    # The first case of a process, which loads and compiles, has a minute of processor time more.
     out, _ = run(study, "--jobs", "1", "--timeout", "0.001", status=4)
     ok, failed = map(int, re.search(r"8 cases of 8 designs: (\d) ok, (\d) failed", out).groups())
     assert ok >= 1 and ok + failed == 8 and "--retry-failed" in out

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from pkgutil import resolve_name
-from time import perf_counter
+from time import monotonic, perf_counter, process_time
 from typing import Any
 
 from hevopt.errors import SolverError
@@ -26,6 +26,7 @@ READY, REFUSED, CASE, OUTCOME, DONE = "ready", "refused", "case", "outcome", "do
 # For whatever ends a sweep before its end.
 KEPT = "all results so far are stored: the same command goes on from there"
 Work = Callable[..., Iterable[Outcome]]
+LOADING_WALL = 10.0
 # The kernel's prctl(2): a signal for this process when the one that started it ends.
 _PR_SET_PDEATHSIG = 1
 # A worker that has gone leaves nothing behind for longer than this.
@@ -39,7 +40,8 @@ class Terms:
     work: "module:name" of a function from job and guard to outcomes, as they are there, the guard being entered
     around every case; a name, so that a worker need not load what only its process uses
     timeout_s: of a case; memory_mb: address space of the process that solves, itself included
-    loading_s: granted on top of timeout_s to the first case of a process, which loads and compiles
+    loading_s: of processor time, granted on top of timeout_s to the first case of a process, which loads and
+    compiles; on a machine with other work it may take LOADING_WALL times as long by the clock
     code: digest that the code beside the worker must have, or None for any
     """
 
@@ -122,8 +124,10 @@ class _Bench:
     def __init__(self, pipe: Connection, terms: Terms, work: Work) -> None:
         self._pipe, self._terms, self._work = pipe, terms, work
         self._loading_s = terms.loading_s
-        # The case under a time limit, the cases to come, and those that were late.
+        # The case under a time limit, until which readings of the clocks it may go on, the cases to come, and
+        # those that were late.
         self._timed: str | None = None
+        self._until_s = self._processor_until_s = 0.0
         self._next: Iterator[str] = iter(())
         self._late = set[str]()
         signal.signal(signal.SIGALRM, self._stop)
@@ -153,18 +157,25 @@ class _Bench:
     @contextmanager
     def _guard(self) -> Iterator[None]:
         key = next(self._next)
-        limit_s, self._loading_s = self._loading_s, 0.0
+        loading_s, self._loading_s = self._loading_s, 0.0
         self._pipe.send((CASE, key))
         try:
-            if self._terms.timeout_s is not None:
+            if (limit_s := self._terms.timeout_s) is not None:
                 self._timed = key
-                signal.setitimer(signal.ITIMER_REAL, self._terms.timeout_s + limit_s)
+                self._until_s = monotonic() + limit_s + LOADING_WALL * loading_s
+                self._processor_until_s = process_time() + loading_s + limit_s
+                signal.setitimer(signal.ITIMER_REAL, limit_s + loading_s)
             yield
         finally:
             self._timed = None
             signal.setitimer(signal.ITIMER_REAL, 0)
 
     def _stop(self, *_: Any) -> None:
+        left_s = min(self._until_s - monotonic(), self._processor_until_s - process_time())
+        # Where others take the processor, a first case has not yet had what it needs to load.
+        if self._timed is not None and left_s > 0:
+            signal.setitimer(signal.ITIMER_REAL, left_s)
+            return
         key, self._timed = self._timed, None
         # An alarm that is heard only after its case stops nothing.
         if key is not None:

@@ -19,7 +19,16 @@ from typing import IO, NamedTuple
 from weakref import finalize
 
 from hevopt.sweeps.plan.jobs import Ending, Failure, Job, Outcome
-from hevopt.sweeps.workers.child import CASE, OUTCOME, READY, REFUSED, CannotStart, Terms, late
+from hevopt.sweeps.workers.child import (
+    CASE,
+    LOADING_WALL,
+    OUTCOME,
+    READY,
+    REFUSED,
+    CannotStart,
+    Terms,
+    late,
+)
 
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS",
@@ -162,7 +171,7 @@ class _Process:
     def _deadline(self) -> float | None:
         if self.terms.timeout_s is None:
             return None
-        loading_s = 0.0 if self._warm else self.terms.loading_s
+        loading_s = 0.0 if self._warm else LOADING_WALL * self.terms.loading_s
         return monotonic() + self.terms.timeout_s + loading_s + _GRACE_S
 
     def _said(self) -> str:
