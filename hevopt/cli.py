@@ -59,6 +59,7 @@ for command in (
     studies.pareto,
     studies.sensitivity,
     studies.reproduction,
+    studies.turbo_lag,
     turbo.tipin,
 ):
     app.command()(command)
