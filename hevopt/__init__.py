@@ -25,6 +25,7 @@ _HOME = {
     "register": "hevopt.strategies",
     "stepwise": "hevopt.strategies.stepwise",
     "Step": "hevopt.strategies.stepwise",
+    "Stepper": "hevopt.strategies.stepper",
     "Signals": "hevopt.problem.table",
     "solve": "hevopt.studies.comparison",
     "simulate": "hevopt.problem.simulation",

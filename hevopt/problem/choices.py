@@ -98,10 +98,9 @@ def require_choices(problem: Problem, choices: Choices, strategy: str) -> None:
         )
 
 
-def require_path(problem: Problem, path: Indices, strategy: str) -> None:
-    """InfeasibleError at the first step where a path of (time,) entries has none, -1."""
-    if (path < 0).any():
-        k = int(np.argmax(path < 0))
+def require_entry(problem: Problem, entry: int, k: int, strategy: str) -> None:
+    """InfeasibleError where a strategy that does not look ahead has no entry at step k, -1."""
+    if entry < 0:
         raise InfeasibleError(
             f"{strategy}: at step {k} (t = {problem.table.time_s[k]:g} s) every usable control needs a forbidden "
             "switch, or more than the battery can deliver beyond its window; see switch_allowed of the table, or "

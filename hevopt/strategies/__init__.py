@@ -29,6 +29,7 @@ from hevopt.strategies.brought import (
     pairs_of,
     place_of,
 )
+from hevopt.strategies.stepper import Stepper
 
 
 class Strategy(NamedTuple):
@@ -37,6 +38,7 @@ class Strategy(NamedTuple):
     causal: decides each step without knowing more of the cycle than `knows` says
     usual: part of a comparison that names no strategies
     previews: takes horizon_s; learns: takes training, problems of the same car on other cycles
+    start: makes a stepper of a problem, with the settings that solve takes; None where it plans all at once
     place: where a strategy of the user's stands, None for the shipped ones and where no other process finds it
     """
 
@@ -48,6 +50,7 @@ class Strategy(NamedTuple):
     usual: bool = True
     previews: bool = False
     learns: bool = False
+    start: Callable[..., Stepper] | None = None
     place: Located | None = None
 
 
@@ -57,19 +60,35 @@ _NONE: frozenset[str] = frozenset()
 _RULE = "present step; its parameters are calibrated on the cycle"
 
 STRATEGIES: dict[str, Strategy] = {
-    "baseline": Strategy(baseline.solve, "present step", _NONE, _STOP | _HYBRID, causal=True),
-    "start_stop": Strategy(start_stop.solve, _RULE, _STOP, _HYBRID),
-    "conventional": Strategy(conventional.solve, _RULE, _HYBRID),
-    "nox_cut": Strategy(nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}),
+    "baseline": Strategy(
+        baseline.solve, "present step", _NONE, _STOP | _HYBRID, causal=True, start=baseline.start
+    ),
+    "start_stop": Strategy(start_stop.solve, _RULE, _STOP, _HYBRID, start=start_stop.start),
+    "conventional": Strategy(conventional.solve, _RULE, _HYBRID, start=conventional.start),
+    "nox_cut": Strategy(nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}, start=nox_cut.start),
     "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
     "dp": Strategy(dp.solve, "whole cycle", _STOP),
     "convex": Strategy(convex.solve, "whole cycle", _HYBRID, usual=False),
     "mpc": Strategy(
-        mpc.solve, "20 s ahead, or --horizon", _HYBRID, causal=True, usual=False, previews=True
+        mpc.solve,
+        "20 s ahead, or --horizon",
+        _HYBRID,
+        causal=True,
+        usual=False,
+        previews=True,
+        start=mpc.start,
     ),
-    "a_ecms": Strategy(a_ecms.solve, "past and present", _HYBRID, causal=True, usual=False),
+    "a_ecms": Strategy(
+        a_ecms.solve, "past and present", _HYBRID, causal=True, usual=False, start=a_ecms.start
+    ),
     "sdp": Strategy(
-        sdp.solve, "past and present; other cycles", _HYBRID, causal=True, usual=False, learns=True
+        sdp.solve,
+        "past and present; other cycles",
+        _HYBRID,
+        causal=True,
+        usual=False,
+        learns=True,
+        start=sdp.start,
     ),
 }
 

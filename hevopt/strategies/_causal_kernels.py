@@ -1,4 +1,4 @@
-"""Compiled loops of the causal strategies: one pass over the steps, each seen once and none ahead.
+"""Compiled decisions of the causal strategies: one step each, and nothing ahead of it.
 
 Choices are those of choices.py. A value function is linear between the nodes of a grid of stored energy.
 """
@@ -9,7 +9,7 @@ import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
-from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.choices import Choices, State
 from hevopt.problem.switching import Switching
 
@@ -49,6 +49,24 @@ class Feedback(NamedTuple):
     edge: float
     window_s: float
     window_reach: float
+
+
+class Memory(NamedTuple):
+    """What the adaptive factor has learnt of the steps so far.
+
+    recovered_j, slowed_v2: energy stored while braking, and fall of the square of speed
+    base_kgpj, since_s: the factor's base, and the time since it moved; integral: of the missing charge
+    oldest, span_s: first step of the past window, and its length; energy_j: stored before the last step
+    """
+
+    recovered_j: float
+    slowed_v2: float
+    base_kgpj: float
+    integral: float
+    since_s: float
+    oldest: int
+    span_s: float
+    energy_j: float
 
 
 @compiled()
@@ -163,65 +181,50 @@ def _factor(
 
 
 @compiled()
+def regained(recovered: float, braking: bool, before: float, after: float) -> float:
+    """Energy recovered so far, with what a step that braked has stored, given the charge before it and after."""
+    return recovered + max(after - before, 0.0) if braking else recovered
+
+
+@compiled()
 def adaptive(
     choices: Choices,
-    view: View,
+    k: int,
     state: State,
+    view: View,
+    memory: Memory,
     target: float,
     window: tuple[float, float],
     p: Feedback,
     battery: BatteryArrays,
-) -> tuple[Indices, Array, float]:
-    """Entries (time,), factors (time,) and the learnt energy recovered per square of speed.
+) -> tuple[int, float, Memory]:
+    """Entry of step k, the factor that it is taken under, and what is remembered from then on.
 
-    choices: their switching counts the share that a start pays at once
+    choices: their switching counts the share that a start pays at once; memory: that of the step before
     """
     drain, speed, braking = view
     low, high = window
-    steps, modes = choices.first.shape[0], choices.first.shape[1] - 1
-    step_s, grid = choices.step_s, SteadyGrid(low, high - low)
-    path, factors = np.empty(steps, dtype=np.int64), np.empty(steps)
-    value = np.zeros((modes, 2))
-    recovered, slowed = p.recovered_jpv2 * p.recovered_weight_v2, p.recovered_weight_v2
-    base, integral, since, oldest, span_s = p.base_kgpj, 0.0, 0.0, 0, 0.0
-    for k in range(steps):
-        if k > 0:
-            slowed += max(speed[k - 1] ** 2 - speed[k] ** 2, 0.0)
-            since += step_s[k - 1]
-            span_s += step_s[k - 1]
-        while oldest < k and span_s > p.window_s:
-            span_s -= step_s[oldest]
-            oldest += 1
-        if span_s > 0.9 * p.window_s and since > 0.25 * p.window_s:
-            owed = recovered / slowed * (speed[k] ** 2 - speed[oldest] ** 2)
-            bracket = p.base_kgpj * (1.0 - p.window_reach), p.base_kgpj * (1.0 + p.window_reach)
-            base = neutral_factor(choices, drain, (oldest, k), owed, bracket)
-            since = 0.0
-        reference = target - recovered / slowed * speed[k] ** 2
-        energy = state.energy_j
-        shortage = (reference - energy) / (0.5 * (high - low))
-        integral += shortage * step_s[k] / p.integral_s
-        integral = min(max(integral, -p.integral_max), p.integral_max)
-        factors[k] = _factor(p, base, shortage, integral, energy, window)
-        value[:, 1] = -factors[k] * (high - low)
-        path[k], state = decide(choices, k, state, value, grid, battery)
-        if braking[k]:
-            recovered += max(state.energy_j - energy, 0.0)
-    return path, factors, recovered / slowed
-
-
-@compiled()
-def follow_map(
-    choices: Choices,
-    step_class: Indices,
-    ahead: Array,
-    state: State,
-    grid: SteadyGrid,
-    battery: BatteryArrays,
-) -> Indices:
-    """Entries (time,) that follow a value ahead (class, mode, node), given the class of each step, (time,)."""
-    steps = choices.first.shape[0]
-    path = np.empty(steps, dtype=np.int64)
-    for k in range(steps):
-        path[k], state = decide(choices, k, state, ahead[step_class[k]], grid, battery)
-    return path
+    step_s, energy = choices.step_s, state.energy_j
+    recovered, slowed, base, integral, since, oldest, span_s, before = memory
+    if k > 0:
+        recovered = regained(recovered, braking[k - 1], before, energy)
+        slowed += max(speed[k - 1] ** 2 - speed[k] ** 2, 0.0)
+        since += step_s[k - 1]
+        span_s += step_s[k - 1]
+    while oldest < k and span_s > p.window_s:
+        span_s -= step_s[oldest]
+        oldest += 1
+    if span_s > 0.9 * p.window_s and since > 0.25 * p.window_s:
+        owed = recovered / slowed * (speed[k] ** 2 - speed[oldest] ** 2)
+        bracket = p.base_kgpj * (1.0 - p.window_reach), p.base_kgpj * (1.0 + p.window_reach)
+        base = neutral_factor(choices, drain, (oldest, k), owed, bracket)
+        since = 0.0
+    reference = target - recovered / slowed * speed[k] ** 2
+    shortage = (reference - energy) / (0.5 * (high - low))
+    integral += shortage * step_s[k] / p.integral_s
+    integral = min(max(integral, -p.integral_max), p.integral_max)
+    factor = _factor(p, base, shortage, integral, energy, window)
+    value = np.zeros((choices.first.shape[1] - 1, 2))
+    value[:, 1] = -factor * (high - low)
+    entry, _ = decide(choices, k, state, value, SteadyGrid(low, high - low), battery)
+    return entry, factor, Memory(recovered, slowed, base, integral, since, oldest, span_s, energy)

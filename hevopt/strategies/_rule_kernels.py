@@ -45,6 +45,12 @@ def load_point_choices(
 
 
 @compiled()
+def taken(wanted: Indices, fallback: Indices, k: int, energy_j: float, least_j: float) -> int:
+    """What a rule takes at step k: the wanted while more than least_j is stored, else the fallback."""
+    return int(wanted[k] if energy_j > least_j else fallback[k])
+
+
+@compiled()
 def drive(
     wanted: Indices,
     fallback: Indices,
@@ -66,7 +72,7 @@ def drive(
     energy = np.empty(steps + 1)
     energy[0] = start.energy_j
     for k in range(steps):
-        entry[k] = wanted[k] if energy[k] > least_j else fallback[k]
+        entry[k] = taken(wanted, fallback, k, energy[k], least_j)
         between = energy[k] - switch_j[choices.switching.case[k], mode, modes[entry[k]]]
         mode = modes[entry[k]]
         energy[k + 1] = between - step_s[k] * chemical_power_at(power[entry[k]], between, battery)

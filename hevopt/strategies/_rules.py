@@ -53,13 +53,33 @@ class Rules(Shown):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Outcome(Shown):
-    """One member of a rule family: its controls, cost, NOx and end charge."""
+    """One member of a rule family: its controls, cost, NOx and end charge.
 
+    wanted, fallback: (time,) controls that are taken while more than least_j is stored, and else
+    control: (time,) those that were
+    """
+
+    wanted: Indices
+    fallback: Indices
+    least_j: float
     control: Indices
     cost_kg: float
     nox_kg: float
     surplus_j: float
     inside: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Calibrated(Shown):
+    """A stepper of the member that a calibration chose, and its plan, which tells of all members."""
+
+    outcome: Outcome
+    plan: Plan
+
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control that the rule takes at step k."""
+        rule = self.outcome
+        return int(kernels.taken(rule.wanted, rule.fallback, k, energy_j, rule.least_j))
 
 
 def rules_of(problem: Problem) -> Rules:
@@ -125,11 +145,11 @@ def is_eligible(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
     return outcome.inside and worth_kg <= share * outcome.cost_kg
 
 
-def best_plan(
+def calibrated(
     rules: Rules,
     members: list[tuple[dict[str, Any], Outcome]],
     figure: Callable[[Mapping[str, Any]], float],
-) -> Plan:
+) -> Calibrated:
     """The eligible member of least figure; the whole family is its calibration, for the curve."""
     calibration = [
         {
@@ -150,7 +170,9 @@ def best_plan(
         )
     eligible = [n for n in inside if calibration[n]["eligible"]] or inside
     chosen = min(eligible, key=lambda n: figure(calibration[n]))
-    return Plan(members[chosen][1].control, {"calibration": calibration, "chosen": chosen})
+    outcome = members[chosen][1]
+    notes = {"calibration": calibration, "chosen": chosen}
+    return Calibrated(outcome, Plan(outcome.control, notes))
 
 
 def _engine_entries(rules: Rules, nox_cap_kgps: float) -> Indices:
@@ -186,6 +208,9 @@ def _outcome(rules: Rules, engine: Indices, threshold_w: float) -> Outcome:
     stored = np.concatenate([energy, energy[:-1] - switch.energy_j])
     least_j, greatest_j = problem.battery.granted_window_j
     return Outcome(
+        choices.control[wanted],
+        choices.control[rest],
+        level,
         control,
         cost_kg,
         float(np.sum(problem.table.nox_kg[np.arange(choices.steps), control])),

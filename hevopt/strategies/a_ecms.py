@@ -33,10 +33,11 @@ import numpy as np
 from hevopt.bounds.prices import drain_at_j
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags
-from hevopt.problem.choices import State, choices_of, require_choices, require_path
+from hevopt.problem.choices import State, choices_of, require_choices, require_entry
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _causal_kernels as kernels
+from hevopt.strategies.stepper import driven
 
 _HEATING_VALUE_JPKG = 42.9e6
 _ENGINE_EFFICIENCY, _CONVERSION_EFFICIENCY = 0.45, 0.94
@@ -55,31 +56,67 @@ FEEDBACK = kernels.Feedback(
 _WINDOW_MIN_S = 10.0
 
 
+class AdaptiveFactor:
+    """The adaptive factor on its way: what it remembers, and the factors so far, (time,), 0 ahead of it."""
+
+    def __init__(self, problem: Problem, settings: kernels.Feedback) -> None:
+        choices = choices_of(problem)
+        require_choices(problem, choices, "a_ecms")
+        drain_j = drain_at_j(problem, choices, problem.start_j)
+        switching = choices.switching
+        share_kg = frozen("switching", settings.start_share * switching.kg)
+        self.problem, self.settings = problem, settings
+        self.choices = choices._replace(switching=switching._replace(kg=share_kg))
+        self.view = kernels.View(drain_j, *_speed_and_braking(problem))
+        self.battery = problem.battery.arrays
+        self.factor_kgpj = np.zeros(choices.steps)
+        weight_v2 = settings.recovered_weight_v2
+        self.memory = kernels.Memory(
+            settings.recovered_jpv2 * weight_v2, weight_v2, settings.base_kgpj, 0.0, 0.0, 0, 0.0,
+            problem.start_j,
+        )  # fmt: skip
+
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control of least equivalent cost at step k."""
+        entry, self.factor_kgpj[k], self.memory = kernels.adaptive(
+            self.choices, k, State(mode, energy_j), self.view, self.memory,
+            self.problem.end_min_j, self.problem.window_j, self.settings, self.battery,
+        )  # fmt: skip
+        require_entry(self.problem, entry, k, "a_ecms")
+        return int(self.choices.control[entry])
+
+    def recovered_jpv2(self, end_j: float) -> float:
+        """Energy recovered per square of speed, as learnt by the end, with what is stored there."""
+        memory, braking = self.memory, bool(self.view.braking[-1])
+        recovered_j = kernels.regained(memory.recovered_j, braking, memory.energy_j, end_j)
+        return float(recovered_j / memory.slowed_v2)
+
+
+def start(
+    problem: Problem, *, window_s: float | None = None, feedback: kernels.Feedback = FEEDBACK
+) -> AdaptiveFactor:
+    """The strategy before the first step; with `window_s`, its base is re-estimated over the past window."""
+    if window_s is not None and not window_s >= _WINDOW_MIN_S:
+        raise DataError(f"window_s {window_s}; allowed: {_WINDOW_MIN_S:g} s or more, or None")
+    return AdaptiveFactor(
+        problem, feedback._replace(window_s=np.inf if window_s is None else float(window_s))
+    )
+
+
 def solve(
     problem: Problem, *, window_s: float | None = None, feedback: kernels.Feedback = FEEDBACK
 ) -> Plan:
     """The plan of one causal pass; with `window_s`, its base re-estimated over the past window."""
-    if window_s is not None and not window_s >= _WINDOW_MIN_S:
-        raise DataError(f"window_s {window_s}; allowed: {_WINDOW_MIN_S:g} s or more, or None")
-    settings = feedback._replace(window_s=np.inf if window_s is None else float(window_s))
-    choices = choices_of(problem)
-    require_choices(problem, choices, "a_ecms")
-    view = kernels.View(drain_at_j(problem, choices, problem.start_j), *_speed_and_braking(problem))
-    switching = choices.switching
-    share_kg = frozen("switching", settings.start_share * switching.kg)
-    path, factor, recovered = kernels.adaptive(
-        choices._replace(switching=switching._replace(kg=share_kg)), view,
-        State(problem.start_mode, problem.start_j), problem.end_min_j, problem.window_j,
-        settings, problem.battery.arrays,
-    )  # fmt: skip
-    require_path(problem, path, "a_ecms")
-    notes = settings._asdict() | {
+    stepper = start(problem, window_s=window_s, feedback=feedback)
+    control, end_j = driven(problem, stepper)
+    factor = stepper.factor_kgpj
+    notes = stepper.settings._asdict() | {
         "window_s": window_s,
         "price_kgpj": float(factor.mean()),
         "price_range_kgpj": (float(factor.min()), float(factor.max())),
-        "recovered_at_end_jpv2": float(recovered),
+        "recovered_at_end_jpv2": stepper.recovered_jpv2(end_j),
     }
-    return Plan(choices.control[path], notes)
+    return Plan(control, notes)
 
 
 def _speed_and_braking(problem: Problem) -> tuple[Array, Flags]:

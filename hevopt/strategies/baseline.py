@@ -4,9 +4,10 @@ import numpy as np
 
 from hevopt.errors import InfeasibleError
 from hevopt.problem.problem import Plan, Problem
+from hevopt.strategies.stepper import Prescribed
 
 
-def solve(problem: Problem) -> Plan:
+def start(problem: Problem) -> Prescribed:
     """At every step the control with engine on whose battery power is nearest to zero, then the cheapest."""
     table = problem.table
     engine_on = np.array([control.engine_on for control in table.controls])
@@ -19,4 +20,9 @@ def solve(problem: Problem) -> Plan:
         )
     idle = np.where(usable, np.abs(table.battery_power_w), np.inf)
     nearest = idle <= idle.min(axis=1, keepdims=True) + 1e-6
-    return Plan(np.argmin(np.where(nearest, problem.cost_kg, np.inf), axis=1))
+    return Prescribed(np.argmin(np.where(nearest, problem.cost_kg, np.inf), axis=1))
+
+
+def solve(problem: Problem) -> Plan:
+    """The plan of those controls."""
+    return Plan(start(problem).control)

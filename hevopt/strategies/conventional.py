@@ -10,16 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hevopt.problem.problem import Plan, Problem
-from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
+from hevopt.strategies._rules import Calibrated, calibrated, neutral_outcome, rules_of
 
 _THRESHOLDS = 24
 
 
-def solve(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Plan:
-    """The family's best member; notes["calibration"] holds the curve over the threshold.
-
-    thresholds_w: members to choose from, by default evenly up to the highest power driven electrically
-    """
+def start(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Calibrated:
+    """The family's member that suits the problem best; see `solve`."""
     rules = rules_of(problem)
     if thresholds_w is None:
         electric = ~rules.standing & ~rules.braking & (rules.electric >= 0)
@@ -29,4 +26,12 @@ def solve(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> P
         ({"threshold_w": threshold}, neutral_outcome(rules, threshold))
         for threshold in thresholds_w
     ]
-    return best_plan(rules, members, lambda member: member["corrected_kg"])
+    return calibrated(rules, members, lambda member: member["corrected_kg"])
+
+
+def solve(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Plan:
+    """The family's best member; notes["calibration"] holds the curve over the threshold.
+
+    thresholds_w: members to choose from, by default evenly up to the highest power driven electrically
+    """
+    return start(problem, thresholds_w=thresholds_w).plan

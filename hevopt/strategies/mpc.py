@@ -22,7 +22,6 @@ Neutrality comes from the feedback alone: the end charge is near the asked one, 
 import numpy as np
 
 from hevopt.errors import DataError, InfeasibleError
-from hevopt.problem._battery_kernels import chemical_power_at
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, State
 from hevopt.problem.problem import Plan, Problem
@@ -30,6 +29,7 @@ from hevopt.strategies import _mpc_kernels as kernels
 from hevopt.strategies._mpc_model import Model, model_of
 from hevopt.strategies._mpc_qp import HorizonSolver, PreviewQp
 from hevopt.strategies._reach_kernels import reachable
+from hevopt.strategies.stepper import driven
 
 HORIZON_S = 20.0
 # Chosen once for all cars and cycles: 1 % of the fuel of 11 km is 6 % of the window of a 1.6 kWh pack, and a price
@@ -44,22 +44,8 @@ _LEAST_CURVATURE = 1e-3
 _ENERGY_ROUNDING = 1e-12
 
 
-def solve(problem: Problem, *, horizon_s: float = HORIZON_S) -> Plan:
-    """The controls of receding-horizon control; notes["fallbacks"] counts the previews OSQP did not solve."""
-    if not 0 < horizon_s <= _HORIZON_MAX_S:
-        raise DataError(f"mpc: horizon_s {horizon_s:g}; allowed: above 0 to {_HORIZON_MAX_S:g} s")
-    controller = Controller(problem, model_of(problem, horizon_s))
-    entries = [controller.decide(k) for k in range(controller.model.choices.steps)]
-    notes = {
-        "horizon_s": horizon_s,
-        "solver": "OSQP",
-        "fallbacks": controller.solver.fallbacks,
-    }
-    return Plan(controller.model.choices.control[entries], notes)
-
-
 class Controller:
-    """Decides step by step; its state is the car's mode and stored energy, and the last QP's answer."""
+    """Decides step by step; it remembers the last QP's answer, and the mode and stored energy before the step."""
 
     def __init__(self, problem: Problem, model: Model) -> None:
         self.problem, self.model = problem, model
@@ -69,20 +55,14 @@ class Controller:
         self.unit_j = (high_j - low_j) / _UNITS_PER_WINDOW
         self.last_price_kgpj = float(model.price_kgpj[0])
 
-    def decide(self, k: int) -> int:
-        """Entry of the choices taken at step k; moves on to the next step."""
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control taken at step k."""
+        self.energy_j, self.mode = energy_j, mode
         modes = self._mode_path(k)
         target_j, price_kgpj = self._powers(k, modes)
         entry = self._entry(k, int(modes[0]), float(target_j[0]), float(price_kgpj[0]))
         self.last_price_kgpj = float(price_kgpj[-1])
-        choices = self.model.choices
-        mode = int(self.problem.table.mode[choices.control[entry]])
-        self.energy_j -= self._taken_j(k, np.array([self.mode]), np.array([mode]))[0]
-        self.mode = mode
-        self.energy_j -= choices.step_s[k] * chemical_power_at(
-            choices.power_w[entry], self.energy_j, self.problem.battery.arrays
-        )
-        return entry
+        return int(self.model.choices.control[entry])
 
     def _taken_j(self, k: int, before: Indices, modes: Indices) -> Array:
         """Stored energy that switching takes, (step,) from step k on."""
@@ -171,3 +151,18 @@ class Controller:
 
     def _place(self, k: int) -> str:
         return f"step {k} (t = {self.problem.table.time_s[k]:g} s)"
+
+
+def start(problem: Problem, *, horizon_s: float = HORIZON_S) -> Controller:
+    """The strategy before the first step, with a preview of `horizon_s`."""
+    if not 0 < horizon_s <= _HORIZON_MAX_S:
+        raise DataError(f"mpc: horizon_s {horizon_s:g}; allowed: above 0 to {_HORIZON_MAX_S:g} s")
+    return Controller(problem, model_of(problem, horizon_s))
+
+
+def solve(problem: Problem, *, horizon_s: float = HORIZON_S) -> Plan:
+    """The controls of receding-horizon control; notes["fallbacks"] counts the previews OSQP did not solve."""
+    stepper = start(problem, horizon_s=horizon_s)
+    control, _ = driven(problem, stepper)
+    notes = {"horizon_s": horizon_s, "solver": "OSQP", "fallbacks": stepper.solver.fallbacks}
+    return Plan(control, notes)

@@ -8,15 +8,15 @@ calibrated: of the whole family, the member of least NOx.
 import numpy as np
 
 from hevopt.problem.problem import Plan, Problem
-from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
+from hevopt.strategies._rules import Calibrated, calibrated, neutral_outcome, rules_of
 
 _CAPS = 10
 _THRESHOLDS = 4
 _ELECTRIC_SHARE_MAX = 0.3
 
 
-def solve(problem: Problem) -> Plan:
-    """The family's member of least NOx; notes["calibration"] holds it all."""
+def start(problem: Problem) -> Calibrated:
+    """The family's member that suits the problem best; see `solve`."""
     rules = rules_of(problem)
     driving = ~rules.standing & ~rules.braking
     top_w = float(np.max(rules.power_w[driving & (rules.electric >= 0)], initial=0.0))
@@ -30,4 +30,9 @@ def solve(problem: Problem) -> Plan:
         for threshold in np.linspace(0.0, _ELECTRIC_SHARE_MAX * top_w, _THRESHOLDS).tolist()
         for cap in (peak * np.geomspace(0.03, 1.0, _CAPS)).tolist()
     ]
-    return best_plan(rules, members, lambda member: member["nox_kg"])
+    return calibrated(rules, members, lambda member: member["nox_kg"])
+
+
+def solve(problem: Problem) -> Plan:
+    """The family's member of least NOx; notes["calibration"] holds it all."""
+    return start(problem).plan

@@ -20,8 +20,9 @@ cycles, each left out of its own training, the mean gap is 1.6 %, the largest 3.
 J. W. Grizzle, "A stochastic control strategy for hybrid electric vehicles", American Control Conference (2004).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from hevopt.problem.choices import (
     State,
     choices_of,
     require_choices,
-    require_path,
+    require_entry,
     without_dominated,
 )
 from hevopt.problem.frozen import frozen
@@ -44,6 +45,7 @@ from hevopt.problem.switching import joined_switching
 from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import _policy_kernels as policies
+from hevopt.strategies.stepper import driven
 
 ENERGY_NODES = 41
 SPEED_BIN_MPS = 5.0
@@ -79,14 +81,32 @@ class Chain(Shown):
     row_share: Array
 
 
-def solve(
-    problem: Problem,
-    training: Sequence[Problem],
-    *,
-    nodes: int = ENERGY_NODES,
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PolicyMap(Shown):
+    """A policy map on its way: the value ahead (class, mode, node), and the class of each step, (time,)."""
+
+    problem: Problem
+    choices: Choices
+    ahead: Array
+    step_class: Indices
+    notes: Mapping[str, Any]
+
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control of least cost, switching and value ahead at step k."""
+        ahead = self.ahead[self.step_class[k]]
+        entry, _ = kernels.decide(
+            self.choices, k, State(mode, energy_j), ahead,
+            _grid(self.problem, ahead.shape[1]), self.problem.battery.arrays,
+        )  # fmt: skip
+        require_entry(self.problem, entry, k, "sdp")
+        return int(self.choices.control[entry])
+
+
+def start(
+    problem: Problem, training: Sequence[Problem], *, nodes: int = ENERGY_NODES,
     memory_s: float = MEMORY_S,
-) -> Plan:
-    """The plan of a policy map learnt from `training`: problems of the same car on other cycles."""
+) -> PolicyMap:  # fmt: skip
+    """The strategy before the first step, its map learnt from `training`: see `solve`."""
     _check(problem, training)
     if not (5 <= nodes <= 2001 and memory_s > 0):
         raise DataError(f"nodes {nodes}, memory_s {memory_s:g}; allowed: 5 to 2001, and > 0")
@@ -96,17 +116,20 @@ def solve(
     ahead, settled = _policy_map(problem, training, chain, price, recovered, nodes, memory_s)
     every = choices_of(problem)
     require_choices(problem, every, "sdp")
-    path = kernels.follow_map(
-        every, classes_of(chain, _signals(problem)), ahead,
-        State(problem.start_mode, problem.start_j), _grid(problem, nodes),
-        problem.battery.arrays,
-    )  # fmt: skip
-    require_path(problem, path, "sdp")
     notes = {
         "training": len(training), "classes": len(chain.speed_mps), "nodes": nodes,
         "memory_s": memory_s, "price_kgpj": price, "recovered_jpv2": recovered, "settled": settled,
     }  # fmt: skip
-    return Plan(every.control[path], notes)
+    return PolicyMap(problem, every, ahead, classes_of(chain, _signals(problem)), notes)
+
+
+def solve(
+    problem: Problem, training: Sequence[Problem], *, nodes: int = ENERGY_NODES,
+    memory_s: float = MEMORY_S,
+) -> Plan:  # fmt: skip
+    """The plan of a policy map learnt from `training`: problems of the same car on other cycles."""
+    stepper = start(problem, training, nodes=nodes, memory_s=memory_s)
+    return Plan(driven(problem, stepper)[0], stepper.notes)
 
 
 def chain_of(signals: Sequence[Signals]) -> Chain:

@@ -4,13 +4,18 @@ What the electric load took meanwhile is charged back while driving; see _rules.
 """
 
 from hevopt.problem.problem import Plan, Problem
-from hevopt.strategies._rules import best_plan, neutral_outcome, rules_of
+from hevopt.strategies._rules import Calibrated, calibrated, neutral_outcome, rules_of
 
 _NEVER_ELECTRIC_W = -1.0
 
 
-def solve(problem: Problem) -> Plan:
-    """The plan of the rule, with the charging power that keeps the charge."""
+def start(problem: Problem) -> Calibrated:
+    """The rule with the charging power that keeps the charge; see `solve`."""
     rules = rules_of(problem)
     outcome = neutral_outcome(rules, _NEVER_ELECTRIC_W)
-    return best_plan(rules, [({}, outcome)], lambda member: member["corrected_kg"])
+    return calibrated(rules, [({}, outcome)], lambda member: member["corrected_kg"])
+
+
+def solve(problem: Problem) -> Plan:
+    """The plan of the rule, with the charging power that keeps the charge."""
+    return start(problem).plan

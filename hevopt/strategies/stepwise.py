@@ -1,4 +1,4 @@
-"""A plan made step by step: what a rule sees of the present, and the loop that drives it with the true battery."""
+"""A rule from outside: what it sees of the present step, and the stepper that asks it."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem import battery as battery_model
-from hevopt.problem._battery_kernels import trace
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.switching import at_step
+from hevopt.strategies.stepper import driven
 
 Array = NDArray[np.float64]
 
@@ -50,24 +50,26 @@ def stepwise(problem: Problem, decide: Callable[[Step], int]) -> Plan:
 
     Raises InfeasibleError at the first step that leaves no usable control, DataError where the rule gives another.
     """
-    table, pack = problem.table, problem.battery
-    engine_on = np.array([control.engine_on for control in table.controls])
-    arrays, window_j = pack.arrays, pack.granted_window_j
-    control = np.empty(len(table.time_s), dtype=np.int64)
-    mode, energy_j = problem.start_mode, problem.start_j
-    for k in range(len(control)):
-        now = _step(problem, k, mode, energy_j, window_j, engine_on)
+    return Plan(driven(problem, Asked(problem, decide))[0])
+
+
+class Asked:
+    """A rule as a stepper: it is shown each step, and what it chooses is checked."""
+
+    def __init__(self, problem: Problem, rule: Callable[[Step], int]) -> None:
+        self.problem, self.rule = problem, rule
+        self.window_j = problem.battery.granted_window_j
+        self.engine_on = np.array([control.engine_on for control in problem.table.controls])
+
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control that the rule takes at step k."""
+        now = _step(self.problem, k, mode, energy_j, self.window_j, self.engine_on)
         if not now.usable.any():
             raise InfeasibleError(
                 f"at {_place(now)} no control is left: each is rejected, needs a forbidden switch or takes the "
                 f"charge out of its window (SOC {now.soc:.4f})"
             )
-        control[k] = _checked(now, decide(now))
-        mode = int(table.mode[control[k]])
-        taken_j, power_w = now.switch_energy_j[control[k]], table.battery_power_w[k, control[k]]
-        one = np.array([taken_j]), np.array([power_w]), table.step_s[k : k + 1]
-        energy_j = float(trace(energy_j, *one, arrays)[-1])
-    return Plan(control)
+        return _checked(now, self.rule(now))
 
 
 def _step(

@@ -11,7 +11,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle, shipped_cycles
 from hevopt.errors import DataError, SolverError
 from hevopt.powertrain.powertrain import build_problem
-from hevopt.problem.problem import Plan, Trajectory
+from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import Strategy, every_strategy, fitting, strategy_named
 from hevopt.studies.case import Case, require_nox
@@ -61,13 +61,24 @@ def _told(case: Case, chosen: Strategy, horizon_s: float | None) -> dict[str, An
     if chosen.previews and horizon_s is not None:
         settings["horizon_s"] = horizon_s
     if chosen.learns:
-        weight = case.problem.nox_weight
-        settings["training"] = [
-            build_problem(case.car, other, nox_weight=weight, allow_shortfall=True)
-            for other in shipped_cycles()
-            if not _same_drive(other, case.cycle)
-        ]
+        settings["training"] = _training(case)
     return settings
+
+
+def _training(case: Case) -> list[Problem]:
+    """The shipped cycles but the case's own, for strategies that learn; SolverError where its steps differ."""
+    step_s = case.problem.table.step_s
+    others = [other for other in shipped_cycles() if not _same_drive(other, case.cycle)]
+    taught_s = np.concatenate([np.diff(other.time_s) for other in others])
+    if not np.allclose(step_s, taught_s[0], rtol=1e-6):
+        raise SolverError(
+            f"it learns from the shipped cycles, in steps of {taught_s[0]:g} s; cycle {case.cycle.name} has steps "
+            f"of {step_s.min():g} to {step_s.max():g} s; resample it, or use a_ecms"
+        )
+    weight = case.problem.nox_weight
+    return [
+        build_problem(case.car, other, nox_weight=weight, allow_shortfall=True) for other in others
+    ]
 
 
 def _same_drive(one: Cycle, other: Cycle) -> bool:

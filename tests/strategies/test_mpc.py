@@ -13,7 +13,7 @@ from hevopt.errors import InfeasibleError
 from hevopt.problem.table import ControlTable
 from hevopt.strategies import _mpc_kernels as kernels
 from hevopt.strategies import _mpc_qp, mpc
-from hevopt.strategies._mpc_model import model_of
+from hevopt.strategies.stepper import driven
 
 HEATING_VALUE_JPKG = 42.9e6
 NEUTRAL_SHARE = 0.01
@@ -38,24 +38,27 @@ def rows(problem: Problem, keep: slice, change=lambda table: {}) -> Problem:
 @pytest.mark.parametrize("architecture", ["C2", "D"])
 def test_neutral_by_feedback_alone_near_the_bound_and_fast(architecture, cycle, problem_of):
     problem = problem_of(architecture, cycle)
-    controller = mpc.Controller(problem, model_of(problem, mpc.HORIZON_S))
-    entries, seconds = [], []
-    for k in range(controller.model.choices.steps):
-        began = perf_counter()
-        entries.append(controller.decide(k))
-        seconds.append(perf_counter() - began)
-    trajectory = simulate(problem, controller.model.choices.control[entries])
+    stepper, seconds = mpc.start(problem), []
+
+    class Timed:
+        def decide(self, *now) -> int:
+            began = perf_counter()
+            control = stepper.decide(*now)
+            seconds.append(perf_counter() - began)
+            return control
+
+    trajectory = simulate(problem, driven(problem, Timed())[0])
     bound_kg, _ = certify(problem).bound_kg(trajectory.end_j)
     gap = trajectory.cost_kg / bound_kg - 1
     share = (trajectory.end_j - problem.start_j) / (trajectory.total_fuel_kg * HEATING_VALUE_JPKG)
     print(
         f"{architecture} {cycle}: gap {gap:.2%}, end SOC {trajectory.soc[-1]:.4f}, charge {share:+.2%} of fuel, "
-        f"{1e3 * np.median(seconds):.2f} ms a step, {controller.solver.fallbacks} fallbacks"
+        f"{1e3 * np.median(seconds):.2f} ms a step, {stepper.solver.fallbacks} fallbacks"
     )
     assert abs(share) <= NEUTRAL_SHARE
     assert 0 <= gap <= GAP_MAX
     assert np.median(seconds) <= STEP_MEDIAN_MAX_S
-    assert controller.solver.fallbacks == 0
+    assert stepper.solver.fallbacks == 0
 
 
 @pytest.mark.parametrize("cut", [210, 290])

@@ -1,0 +1,51 @@
+"""A causal strategy as a stepper, asked for one control after the other; and the one loop that drives it.
+
+Whoever drives it tells it what is stored: the loop below by the problem's battery, another simulation by its own.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hevopt.display.facts import Shown
+from hevopt.problem._battery_kernels import chemical_power_at
+from hevopt.problem.arrays import Indices
+from hevopt.problem.problem import Problem
+from hevopt.problem.switching import at_step
+
+
+class Stepper(Protocol):
+    """A strategy on its way through a problem, remembering what it has seen; `start` of a `Strategy` makes one."""
+
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control that step k takes; steps are asked for once each, in order.
+
+        energy_j, mode: stored energy and mode before the step. Raises InfeasibleError where no control is left.
+        """
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Prescribed(Shown):
+    """A stepper whose control depends on the step alone, each found from its own row; control: (time,)."""
+
+    control: Indices
+
+    def decide(self, k: int, energy_j: float, mode: int) -> int:
+        """Index of the control at step k, whatever is stored."""
+        return int(self.control[k])
+
+
+def driven(problem: Problem, stepper: Stepper) -> tuple[Indices, float]:
+    """(time,) controls of a stepper that drives the whole problem, and the stored energy at its end."""
+    table, battery = problem.table, problem.battery.arrays
+    control = np.empty(len(table.time_s), dtype=np.int64)
+    energy_j, before = problem.start_j, problem.start_mode
+    for k in range(len(control)):
+        chosen = control[k] = stepper.decide(k, energy_j, before)
+        mode = int(table.mode[chosen])
+        between_j = energy_j - float(at_step(table.switch_energy_j, k)[before, mode])
+        power_w, step_s = float(table.battery_power_w[k, chosen]), float(table.step_s[k])
+        energy_j = between_j - step_s * chemical_power_at(power_w, between_j, battery)
+        before = mode
+    return control, energy_j
