@@ -142,7 +142,7 @@ def certify(
 
     A rung that fails is left out and named in `failures`. Raises SolverError where a bound is above the rollout.
     """
-    lines = one_price_dual(problem)
+    lines = list(one_price_dual(problem))
     certificate = Certificate(
         problem.end_min_j, {Proof.ONE_MULTIPLIER: lines}, end_slack_j=end_slack_j(problem)
     )

@@ -39,6 +39,7 @@ from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, kept
 from hevopt.problem.frozen import frozen
+from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
 from hevopt.problem.switching import Switched, switched
 
@@ -93,7 +94,8 @@ def drain_at_j(problem: Problem, choices: Choices, energy_j: float | Array) -> A
     return drain_w * choices.spread(choices.step_s)
 
 
-def one_price_dual(problem: Problem) -> list[Line]:
+@once
+def one_price_dual(problem: Problem) -> tuple[Line, ...]:
     """Supporting lines of g up to its maximum; the best one comes last."""
     choices = bounded_choices(problem)
     worth = least_drain_j(problem, choices)
@@ -101,7 +103,7 @@ def one_price_dual(problem: Problem) -> list[Line]:
     priced = Priced(
         worth, np.ones(choices.steps), problem.end_min_j - problem.start_j, 1.0, rounding
     )
-    return dual(problem, choices, priced)
+    return tuple(dual(problem, choices, priced))
 
 
 def before_steps(price: Array) -> Array:

@@ -16,6 +16,8 @@ from hevopt.errors import DataError
 from hevopt.problem import _battery_kernels as kernels
 from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.frozen import frozen
+from hevopt.problem.once import once
 
 # What simulate lets a plan leave the window by: shares of the window, or of all stored energy if that is more.
 _WINDOW_TOLERANCE, _ENERGY_ROUNDING = 1e-9, 4e-12
@@ -23,7 +25,7 @@ _WINDOW_TOLERANCE, _ENERGY_ROUNDING = 1e-9, 4e-12
 _ROUNDING = 1e-12
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False, weakref_slot=True)
 class Battery(Shown):
     """A battery pack at its terminals; curves over SOC are linear between their points.
 
@@ -93,12 +95,15 @@ class Battery(Shown):
             )
 
     @property
+    @once
     def point_energy_j(self) -> Array:
         """(point,) stored energy at the curves' points, 0 at the first."""
         mean_v = (self.open_circuit_v[1:] + self.open_circuit_v[:-1]) / 2
-        return np.concatenate([[0.0], np.cumsum(self.capacity_as * mean_v * np.diff(self.soc))])
+        steps_j = self.capacity_as * mean_v * np.diff(self.soc)
+        return frozen("point_energy_j", np.concatenate([[0.0], np.cumsum(steps_j)]))
 
     @property
+    @once
     def arrays(self) -> BatteryArrays:
         """The same for compiled loops."""
         return BatteryArrays(
@@ -112,12 +117,14 @@ class Battery(Shown):
         )
 
     @property
+    @once
     def granted_window_j(self) -> tuple[float, float]:
         """Stored energy between which a plan must stay: the window, and beyond it what rounding may take."""
         low, high = energy_j(self, np.array([self.soc_min, self.soc_max]))
         slack = max(_WINDOW_TOLERANCE * (high - low), _ENERGY_ROUNDING * high)
         return float(low - slack), float(high + slack)
 
+    @once
     def within_window(self) -> BatteryArrays:
         """The curves cut to the granted window, their ends interpolated: all that a proof may see of them."""
         whole = self.arrays
@@ -126,10 +133,11 @@ class Battery(Shown):
         first, last = ends[:, :1], ends[:, 1:]
         points = np.stack([curve[inner] for curve in whole[:4]])
         low, high = self.granted_window_j
-        soc, voltage, discharge, charge = np.concatenate([first, points, last], axis=1)
-        energy = np.concatenate([[low], whole.energy_j[inner], [high]])
+        curves = np.concatenate([first, points, last], axis=1)
+        soc, voltage, discharge, charge = (frozen("curves", curve) for curve in curves)
+        energy_j = frozen("energy_j", np.concatenate([[low], whole.energy_j[inner], [high]]))
         return BatteryArrays(
-            soc, voltage, discharge, charge, energy, whole.capacity_as, whole.coulombic_efficiency
+            soc, voltage, discharge, charge, energy_j, whole.capacity_as, whole.coulombic_efficiency
         )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hevopt.errors import InfeasibleError
 from hevopt.problem._choices_kernels import undominated
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
 from hevopt.problem.switching import Number, Switching, switching_of
 
@@ -66,8 +67,9 @@ class Choices(NamedTuple):
         return int(self.switching.kg.shape[1])
 
 
+@once
 def choices_of(problem: Problem) -> Choices:
-    """All feasible controls of a problem, by step, mode and column."""
+    """All feasible controls of a problem, by step, mode and column; all who ask share them."""
     table = problem.table
     modes = table.modes
     columns = np.argsort(table.mode, kind="stable")

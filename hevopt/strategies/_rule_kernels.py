@@ -1,11 +1,34 @@
 """Compiled parts of the rule-based strategies."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power_at
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices, State
+
+
+class Rule(NamedTuple):
+    """Entries that a rule takes but for those of the engine, whose charging power is searched.
+
+    electric: (time,) while more than least_j is stored, -1 where never
+    fixed: (time,) else, -1 where the engine drives; modes: (entry,) that all entries lead to
+    """
+
+    electric: Indices
+    fixed: Indices
+    modes: Indices
+    least_j: float
+
+
+class Driven(NamedTuple):
+    """A drive under a rule: entries (time,) that were taken, and energy and mode (time + 1,) before each step."""
+
+    entry: Indices
+    energy_j: Array
+    mode: Indices
 
 
 @compiled()
@@ -45,35 +68,81 @@ def load_point_choices(
 
 
 @compiled()
-def taken(wanted: Indices, fallback: Indices, k: int, energy_j: float, least_j: float) -> int:
-    """What a rule takes at step k: the wanted while more than least_j is stored, else the fallback."""
-    return int(wanted[k] if energy_j > least_j else fallback[k])
+def taken(wanted: int, fallback: int, energy_j: float, least_j: float) -> int:
+    """What a rule takes: the wanted while more than least_j is stored, else the fallback."""
+    return wanted if energy_j > least_j else fallback
 
 
 @compiled()
-def drive(
-    wanted: Indices,
-    fallback: Indices,
+def _drive(
+    rule: Rule,
+    engine: Indices,
+    begin: int,
     choices: Choices,
-    modes: Indices,
-    start: State,
-    least_j: float,
     battery: BatteryArrays,
-) -> tuple[Indices, Array]:
-    """Entries (time,) that take `wanted` while more than least_j is stored and else `fallback`, and the energy.
-
-    wanted, fallback: (time,) entries; they agree where there is nothing to choose.
-    modes: (entry,) that they lead to
-    """
+    driven: Driven,
+) -> float:
+    """Drive on from a step with the engine's entries, (time,); the stored energy at the end."""
     power, step_s = choices.power_w, choices.step_s
-    _, _, switch_j, _ = choices.switching
-    steps, mode = len(step_s), start.mode
-    entry = np.empty(steps, dtype=np.int64)
-    energy = np.empty(steps + 1)
-    energy[0] = start.energy_j
-    for k in range(steps):
-        entry[k] = taken(wanted, fallback, k, energy[k], least_j)
-        between = energy[k] - switch_j[choices.switching.case[k], mode, modes[entry[k]]]
-        mode = modes[entry[k]]
-        energy[k + 1] = between - step_s[k] * chemical_power_at(power[entry[k]], between, battery)
-    return entry, energy
+    case, _, switch_j, _ = choices.switching
+    modes, (entry, energy, mode) = rule.modes, driven
+    for k in range(begin, len(step_s)):
+        fallback = rule.fixed[k] if rule.fixed[k] >= 0 else engine[k]
+        wanted = rule.electric[k] if rule.electric[k] >= 0 else fallback
+        chosen = taken(wanted, fallback, energy[k], rule.least_j)
+        between = energy[k] - switch_j[case[k], mode[k], modes[chosen]]
+        entry[k], mode[k + 1] = chosen, modes[chosen]
+        energy[k + 1] = between - step_s[k] * chemical_power_at(power[chosen], between, battery)
+    end_j: float = energy[-1]
+    return end_j
+
+
+@compiled()
+def _at_rest(steps: int, start: State) -> Driven:
+    driven = Driven(
+        np.empty(steps, dtype=np.int64), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64)
+    )
+    driven.energy_j[0], driven.mode[0] = start.energy_j, start.mode
+    return driven
+
+
+@compiled()
+def neutral_drive(
+    rule: Rule,
+    engine: Indices,
+    choices: Choices,
+    start: State,
+    end_j: float,
+    battery: BatteryArrays,
+) -> tuple[Driven, Indices]:
+    """The drive whose charging power ends with end_j or just more, and the engine's entries in it, (time,).
+
+    engine: (level, time) entries by rising charging power. The lowest level that reaches the charge is kept up to
+    the first step that will do, the one below it from there on; where none reaches it, the highest is kept.
+    Both are found by halving, as more charging leaves more charge.
+    """
+    steps, top = len(choices.step_s), len(engine) - 1
+    driven = _at_rest(steps, start)
+    if _drive(rule, engine[0], 0, choices, battery, driven) - end_j >= 0.0:
+        return driven, engine[0]
+    if _drive(rule, engine[top], 0, choices, battery, driven) - end_j < 0.0:
+        return driven, engine[top]
+    below, level = 0, top
+    while level - below > 1:
+        middle = (below + level) // 2
+        if _drive(rule, engine[middle], 0, choices, battery, driven) - end_j >= 0.0:
+            level = middle
+        else:
+            below = middle
+    _drive(rule, engine[level], 0, choices, battery, driven)
+    tried, short, until = _at_rest(steps, start), 0, steps
+    while until - short > 1:
+        # Up to the step the drive is known.
+        middle = (short + until) // 2
+        tried.energy_j[middle], tried.mode[middle] = driven.energy_j[middle], driven.mode[middle]
+        if _drive(rule, engine[level - 1], middle, choices, battery, tried) - end_j >= 0.0:
+            until = middle
+        else:
+            short = middle
+    _drive(rule, engine[level - 1], until, choices, battery, driven)
+    return driven, np.concatenate((engine[level, :until], engine[level - 1, until:]))

@@ -79,7 +79,8 @@ class Calibrated(Shown):
     def decide(self, k: int, energy_j: float, mode: int) -> int:
         """Index of the control that the rule takes at step k."""
         rule = self.outcome
-        return int(kernels.taken(rule.wanted, rule.fallback, k, energy_j, rule.least_j))
+        wanted, fallback = int(rule.wanted[k]), int(rule.fallback[k])
+        return int(kernels.taken(wanted, fallback, energy_j, rule.least_j))
 
 
 def rules_of(problem: Problem) -> Rules:
@@ -113,27 +114,28 @@ def rules_of(problem: Problem) -> Rules:
     )
 
 
-def neutral_outcome(rules: Rules, threshold_w: float, nox_cap_kgps: float = np.inf) -> Outcome:
-    """The family's member for an electric threshold and a NOx cap, its charging power found for neutrality."""
-    shifted = _engine_entries(rules, nox_cap_kgps)
-    tried: dict[tuple[int, int], Outcome] = {}
+def neutral_outcome(rules: Rules, threshold_w: float, engine: Indices) -> Outcome:
+    """The family's member for an electric threshold, its charging power found for neutrality.
 
-    def outcome(level: int, until: int) -> Outcome:
-        """The charging level up to a step and the level below it after."""
-        if (level, until) not in tried:
-            engine = shifted[level].copy()
-            engine[until:] = shifted[max(level - 1, 0), until:]
-            tried[level, until] = _outcome(rules, engine, threshold_w)
-        return tried[level, until]
-
-    steps, top = rules.choices.steps, len(rules.charge_w) - 1
-    if outcome(0, steps).surplus_j >= 0:
-        return outcome(0, steps)
-    if outcome(top, steps).surplus_j < 0:
-        return outcome(top, steps)
-    level = _first_true(0, top, lambda n: outcome(n, steps).surplus_j >= 0)
-    until = _first_true(0, steps, lambda n: outcome(level, n).surplus_j >= 0)
-    return outcome(level, until)
+    engine: (level, time) entries by charging power, of `engine_entries`
+    """
+    choices, problem = rules.choices, rules.problem
+    driving = ~rules.standing & ~rules.braking
+    electric = driving & (rules.power_w <= threshold_w) & (rules.electric >= 0)
+    launch_on_engine = rules.engaging & ~_next_true(electric, rules.standing)
+    stopped = rules.standing & ~launch_on_engine & (rules.off >= 0)
+    low, high = problem.window_j
+    rule = kernels.Rule(
+        electric=np.where(electric, rules.electric, -1),
+        fixed=np.where(stopped, rules.off, np.where(rules.braking, rules.recover, -1)),
+        modes=problem.table.mode[choices.control],
+        least_j=low + _SOC_LEVEL_SHARE * (high - low),
+    )
+    driven, burning = kernels.neutral_drive(
+        rule, engine, choices, State(problem.start_mode, problem.start_j), problem.end_min_j,
+        problem.battery.arrays,
+    )  # fmt: skip
+    return _outcome(rules, rule, driven, burning)
 
 
 def is_eligible(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
@@ -175,7 +177,8 @@ def calibrated(
     return Calibrated(outcome, Plan(outcome.control, notes))
 
 
-def _engine_entries(rules: Rules, nox_cap_kgps: float) -> Indices:
+def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
+    """(level, time) entries that the engine drives with under a cap on NOx, by charging power."""
     choices = rules.choices
     steps = choices.spread(np.arange(choices.steps))
     nox = rules.problem.table.nox_kg[steps, choices.control]
@@ -187,34 +190,24 @@ def _engine_entries(rules: Rules, nox_cap_kgps: float) -> Indices:
     return np.where(rules.standing, shifted[0], shifted)
 
 
-def _outcome(rules: Rules, engine: Indices, threshold_w: float) -> Outcome:
-    choices, problem = rules.choices, rules.problem
-    driving = ~rules.standing & ~rules.braking
-    electric = driving & (rules.power_w <= threshold_w) & (rules.electric >= 0)
-    launch_on_engine = rules.engaging & ~_next_true(electric, rules.standing)
-    rest = np.where(rules.braking, rules.recover, engine)
-    stopped = rules.standing & ~launch_on_engine & (rules.off >= 0)
-    rest = np.where(stopped, rules.off, rest)
-    wanted = np.where(electric, rules.electric, rest)
-    low, high = problem.window_j
-    level = low + _SOC_LEVEL_SHARE * (high - low)
-    start, modes = State(problem.start_mode, problem.start_j), problem.table.mode[choices.control]
-    entry, energy = kernels.drive(
-        wanted, rest, choices, modes, start, level, problem.battery.arrays
-    )
-    control = choices.control[entry]
-    cost_kg, _ = total_cost_kg(problem, control)
+def _outcome(rules: Rules, rule: kernels.Rule, driven: kernels.Driven, engine: Indices) -> Outcome:
+    """What a drive under a rule with the engine's entries, (time,), comes to."""
+    problem, choices = rules.problem, rules.choices
+    fallback = np.where(rule.fixed >= 0, rule.fixed, engine)
+    wanted = np.where(rule.electric >= 0, rule.electric, fallback)
+    control, energy_j = choices.control[driven.entry], driven.energy_j
+    steps = np.arange(choices.steps)
     switch = switched(problem.table, problem.start_mode, control)
-    stored = np.concatenate([energy, energy[:-1] - switch.energy_j])
+    stored = np.concatenate([energy_j, energy_j[:-1] - switch.energy_j])
     least_j, greatest_j = problem.battery.granted_window_j
     return Outcome(
         choices.control[wanted],
-        choices.control[rest],
-        level,
+        choices.control[fallback],
+        rule.least_j,
         control,
-        cost_kg,
-        float(np.sum(problem.table.nox_kg[np.arange(choices.steps), control])),
-        float(energy[-1]) - problem.end_min_j,
+        total_cost_kg(problem, control)[0],
+        float(np.sum(problem.table.nox_kg[steps, control])),
+        float(energy_j[-1]) - problem.end_min_j,
         bool((stored >= least_j).all() and (stored <= greatest_j).all())
         and bool(switch.allowed.all()),
     )
@@ -243,11 +236,3 @@ def _least(choices: Choices, figure: Array, allowed: Flags) -> Indices:
 
 def _step_minimum(choices: Choices, figure: Array) -> Array:
     return np.minimum.reduceat(figure, choices.first[:, 0])
-
-
-def _first_true(low: int, high: int, holds: Callable[[int], bool]) -> int:
-    """The first n in (low, high] at which `holds` turns true, given that it is false at low and true at high."""
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return high

@@ -10,7 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hevopt.problem.problem import Plan, Problem
-from hevopt.strategies._rules import Calibrated, calibrated, neutral_outcome, rules_of
+from hevopt.strategies._rules import (
+    Calibrated,
+    calibrated,
+    engine_entries,
+    neutral_outcome,
+    rules_of,
+)
 
 _THRESHOLDS = 24
 
@@ -22,8 +28,9 @@ def start(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> C
         electric = ~rules.standing & ~rules.braking & (rules.electric >= 0)
         top_w = float(np.max(rules.power_w[electric], initial=0.0))
         thresholds_w = np.linspace(0.0, top_w, _THRESHOLDS).tolist()
+    engine = engine_entries(rules)
     members = [
-        ({"threshold_w": threshold}, neutral_outcome(rules, threshold))
+        ({"threshold_w": threshold}, neutral_outcome(rules, threshold, engine))
         for threshold in thresholds_w
     ]
     return calibrated(rules, members, lambda member: member["corrected_kg"])

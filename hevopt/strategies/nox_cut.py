@@ -8,7 +8,13 @@ calibrated: of the whole family, the member of least NOx.
 import numpy as np
 
 from hevopt.problem.problem import Plan, Problem
-from hevopt.strategies._rules import Calibrated, calibrated, neutral_outcome, rules_of
+from hevopt.strategies._rules import (
+    Calibrated,
+    calibrated,
+    engine_entries,
+    neutral_outcome,
+    rules_of,
+)
 
 _CAPS = 10
 _THRESHOLDS = 4
@@ -22,13 +28,16 @@ def start(problem: Problem) -> Calibrated:
     top_w = float(np.max(rules.power_w[driving & (rules.electric >= 0)], initial=0.0))
     nox_kgps = problem.table.nox_kg / problem.table.step_s[:, None]
     peak = float(np.max(nox_kgps[driving], initial=0.0))
+    engines = {
+        cap: engine_entries(rules, cap) for cap in (peak * np.geomspace(0.03, 1.0, _CAPS)).tolist()
+    }
     members = [
         (
             {"threshold_w": threshold, "nox_cap_kgps": cap},
-            neutral_outcome(rules, threshold, cap),
+            neutral_outcome(rules, threshold, engine),
         )
         for threshold in np.linspace(0.0, _ELECTRIC_SHARE_MAX * top_w, _THRESHOLDS).tolist()
-        for cap in (peak * np.geomspace(0.03, 1.0, _CAPS)).tolist()
+        for cap, engine in engines.items()
     ]
     return calibrated(rules, members, lambda member: member["nox_kg"])
 

@@ -4,7 +4,13 @@ What the electric load took meanwhile is charged back while driving; see _rules.
 """
 
 from hevopt.problem.problem import Plan, Problem
-from hevopt.strategies._rules import Calibrated, calibrated, neutral_outcome, rules_of
+from hevopt.strategies._rules import (
+    Calibrated,
+    calibrated,
+    engine_entries,
+    neutral_outcome,
+    rules_of,
+)
 
 _NEVER_ELECTRIC_W = -1.0
 
@@ -12,7 +18,7 @@ _NEVER_ELECTRIC_W = -1.0
 def start(problem: Problem) -> Calibrated:
     """The rule with the charging power that keeps the charge; see `solve`."""
     rules = rules_of(problem)
-    outcome = neutral_outcome(rules, _NEVER_ELECTRIC_W)
+    outcome = neutral_outcome(rules, _NEVER_ELECTRIC_W, engine_entries(rules))
     return calibrated(rules, [({}, outcome)], lambda member: member["corrected_kg"])
 
 

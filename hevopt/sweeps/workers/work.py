@@ -109,7 +109,8 @@ class _Bench:
 
 def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, Any]:
     """The certified dual alone: what no plan that ends with the asked charge can undercut."""
-    certificate = Certificate(problem.end_min_j, {Proof.ONE_MULTIPLIER: one_price_dual(problem)})
+    lines = list(one_price_dual(problem))
+    certificate = Certificate(problem.end_min_j, {Proof.ONE_MULTIPLIER: lines})
     bound_kg, proof = certificate.bound_kg(problem.end_min_j)
     row = Row(
         car.name,
