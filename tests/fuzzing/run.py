@@ -2,7 +2,8 @@
 
     python tests/fuzzing/run.py --count 10000 --seed 1
 
-Case n of a seed is always the same. Exit status 1 and the spoilt files in --keep where something was wrong.
+Case n of a seed is always the same. Faults are told as they
+are found; exit status 1 and the spoilt files in --keep where there was one.
 
 What it has found, all mended since:
 - scipy's loadmat dies of a segmentation fault on spoilt .mat files; hence a reader of levels 4 and 5 of our own.
@@ -21,6 +22,8 @@ import shutil
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 if __name__ == "__main__":
@@ -31,6 +34,8 @@ from fuzzing.crafted import CRAFTED
 from fuzzing.mutations import COMMON, RARE, RARE_EVERY
 from fuzzing.runner import fault_of, run
 from fuzzing.seed import SHORT_CYCLE, Seed
+
+TELL_EVERY = 250
 
 
 def spoilt(
@@ -53,11 +58,15 @@ def spoilt(
     return good, contents, list(rng.choice(good.commands)), "+".join(m.__name__ for m in kinds)
 
 
-def fuzz(seed: int, cases: range, keep: Path | None, *, rare: bool) -> tuple[list[str], Counter]:
-    """Descriptions of all cases with a fault, and how often each status came."""
+def fuzz(
+    seed: int, cases: range, keep: Path | None, *, rare: bool, tell: Callable[[str], object] = len
+) -> tuple[list[str], Counter]:
+    """Descriptions of all cases with a fault, and how often each status came; tell: hears of each fault at once."""
     _load_compiled_parts()
     files, faults, statuses = seeds(), [], Counter()
     for case in cases:
+        if case > cases.start and not case % TELL_EVERY:
+            tell(f"{len(faults)} faults in {case - cases.start} cases so far")
         good, contents, words, how = spoilt(seed, case, files, rare=rare)
         with tempfile.TemporaryDirectory(prefix="hevopt-fuzz-") as name:
             folder = Path(name)
@@ -69,6 +78,7 @@ def fuzz(seed: int, cases: range, keep: Path | None, *, rare: bool) -> tuple[lis
             if fault:
                 last = (seen.err.strip().splitlines() or [""])[-1][:300]
                 faults.append(f"case {case}: {' '.join(words)}; {how}: {fault}; {last}")
+                tell(faults[-1])
                 if keep:
                     keep.mkdir(parents=True, exist_ok=True)
                     shutil.copy(folder / good.name, keep / f"{case}-{good.name}")
@@ -92,7 +102,8 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder for the files of faulty cases")
     chosen = parser.parse_args()
     cases = range(chosen.first, chosen.first + chosen.count)
-    faults, statuses = fuzz(chosen.seed, cases, chosen.keep, rare=True)
+    tell = partial(print, flush=True)
+    faults, statuses = fuzz(chosen.seed, cases, chosen.keep, rare=True, tell=tell)
     for name, count in sorted(statuses.items()):
         print(f"{count:6} {name}")
     print(f"{len(faults)} faults in {chosen.count} cases", *faults, sep="\n")
