@@ -96,6 +96,19 @@ _SPELLINGS: dict[str, dict[str, float]] = {
         "g/h gph g/hr gh-1": 1e-3 / 3600,
         "mg/h mgph": 1e-6 / 3600,
         "lb/h lbs/h lb/hr lbs/hr": 0.45359237 / 3600,
+        "kg/min": 1 / 60,
+        "lb/min lbs/min": 0.45359237 / 60,
+    },
+    # Of turbochargers: flow sqrt(T) / p and speed / sqrt(T).
+    "reduced flow": {
+        "kg/s√K/Pa": 1.0,
+        "kg/s√K/kPa kg√K/s/kPa kg√K/skPa kg√K/(skPa) kg/ssqrt(K)/kPa kgsqrt(K)/(skPa) kg/sK05/kPa": 1e-3,
+        "kg/s√K/bar kg√K/s/bar kg√K/sbar kg√K/(sbar) kg/ssqrt(K)/bar kgsqrt(K)/(sbar) kg/sK05/bar": 1e-5,
+        "kg/s√K/MPa kg√K/s/MPa kg√K/sMPa kg√K/(sMPa) kg/ssqrt(K)/MPa kgsqrt(K)/(sMPa) kg/sK05/MPa": 1e-6,
+    },
+    "reduced speed": {
+        "rad/s/√K": 1.0,
+        "rpm/√K 1/min/√K min-1/√K rpm/sqrt(K) rpmK-05 rpm/K05": 2 * pi / 60,
     },
     "volume flow": {
         "m3/s": 1.0,

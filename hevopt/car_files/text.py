@@ -12,17 +12,21 @@ _WIDTH = 112
 def component_text(
     head: Iterable[str], contents: Mapping[str, Any], origins: Mapping[str, str]
 ) -> str:
-    """TOML of tables one or two deep. head: comment lines; origins: key path -> comment behind the key."""
+    """TOML of tables. head: comment lines; origins: key path -> comment behind the key."""
     out = [f"# {printable(line)}" for line in head]
+    return "\n".join([*out, *_table(contents, "", origins)]) + "\n"
+
+
+def _table(contents: Mapping[str, Any], prefix: str, origins: Mapping[str, str]) -> list[str]:
+    """Keys of a table, then the tables in it."""
     tables = {key: value for key, value in contents.items() if isinstance(value, Mapping)}
-    out += _keys(
-        {k: v for k, v in contents.items() if k not in tables and v is not None}, "", origins
-    )
+    plain = {k: v for k, v in contents.items() if k not in tables and v is not None}
+    out = _keys(plain, prefix, origins)
     for name, table in tables.items():
-        note = origins.get(name)
-        out += ["", f"[{name}]" + (f"  # {printable(note)}" if note else "")]
-        out += _keys({k: v for k, v in table.items() if v is not None}, f"{name}.", origins)
-    return "\n".join(out) + "\n"
+        note = origins.get(prefix + name)
+        out += ["", f"[{prefix}{name}]" + (f"  # {printable(note)}" if note else "")]
+        out += _table(table, f"{prefix}{name}.", origins)
+    return out
 
 
 def _keys(table: Mapping[str, Any], prefix: str, origins: Mapping[str, str]) -> list[str]:

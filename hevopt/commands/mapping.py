@@ -32,7 +32,8 @@ def import_map(
         Path, typer.Argument(help="Table of the points, a grid, or a .mat file of axes and matrix.")
     ],
     kind: Annotated[
-        Literal["engine", "machine"], typer.Option("--kind", help="engine or machine.")
+        Literal["engine", "machine", "compressor", "turbine"],
+        typer.Option("--kind", help="engine, machine, or an engine's compressor or turbine."),
     ],
     like: LikeOption = None,
     out: Annotated[
@@ -61,17 +62,28 @@ def import_map(
         ),
     ] = None,
     sheet: SheetOption = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            "--reference",
+            metavar="KELVIN,BAR",
+            help="What a compressor's or turbine's flow and speed are corrected to, such as 298.15,1.013.",
+        ),
+    ] = None,
 ) -> None:
     """A component file, with what the map covers, from measured points of an engine or a machine.
+
+    A compressor or turbine goes into the mean_value part of the engine that --like names, as the compact map
+    nearest to its points of corrected flow and speed, pressure ratio and efficiency; a turbine may have vane
+    positions.
 
     A MATLAB file holds vectors of speed and torque and a matrix over both. Data written as a program (.m) with
     fc_map_spd, fc_map_trq, fc_fuel_map and fc_max_trq, or mc_map_spd, mc_map_trq, mc_eff_map and mc_max_trq: run it
     in MATLAB or Octave, there save('map.mat', 'fc_map_spd', 'fc_map_trq', 'fc_fuel_map', 'fc_max_trq', '-v7'), and
     import map.mat; a machine's file is its --full-load too.
     """
-    from hevopt.measured.maps.component import check_map_file, with_suffix
+    from hevopt.measured.maps.component import check_map_file, roles_of, with_suffix
     from hevopt.measured.maps.component import import_map as measured_map
-    from hevopt.measured.maps.roles import ROLES
     from hevopt.measured.sources import own_file
 
     values = values_of(given)
@@ -83,8 +95,8 @@ def import_map(
     check_map_file(out, (file, *map(Path, own_file(like))))
     found = measured_map(
         file, kind, like=like, full_load=full_load, motoring=motoring, nox=nox,
-        columns=pairs("--column", column, ROLES), units=pairs("--unit", unit, ROLES), rows=rows,
-        sheet=sheet, values=values,
+        columns=pairs("--column", column, roles_of(kind)), units=pairs("--unit", unit, roles_of(kind)),
+        rows=rows, sheet=sheet, values=values, reference=_reference(reference),
     )  # fmt: skip
     plot, imported = found.write(out), found.imported
     for note in imported.notes:
@@ -95,3 +107,18 @@ def import_map(
         write(f"  {printable(origin)}: {printable(keys)}")
     write("\n".join(found.coverage))
     write(f"component written to {out}, plot to {plot}")
+
+
+def _reference(text: str | None) -> tuple[float, float] | None:
+    """Temperature in K and pressure in Pa."""
+    from hevopt.files.shown import shown
+
+    if text is None:
+        return None
+    try:
+        kelvin, bar = (float(part) for part in text.split(","))
+    except ValueError:
+        raise DataError(
+            f"--reference {shown(text)}; needed: temperature in K and pressure in bar, such as 298.15,1.013"
+        ) from None
+    return kelvin, bar * 1e5

@@ -1,4 +1,4 @@
-"""A measured map of an engine or a machine as a component: its file, what it covers, and the picture of that."""
+"""A measured map as a component: its file, what it covers, and the picture of that."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,6 +17,10 @@ from hevopt.measured.maps.report import coverage
 from hevopt.measured.maps.request import ImportedMap, Request
 from hevopt.measured.maps.roles import ROLES
 from hevopt.measured.maps.tables import Source
+from hevopt.measured.maps.turbo import KINDS as TURBO_KINDS
+from hevopt.measured.maps.turbo import ImportedTurbo, import_turbo
+from hevopt.measured.maps.turbo_figure import turbo_figure
+from hevopt.measured.maps.turbo_points import ROLES as TURBO_ROLES
 from hevopt.measured.sources import digests, own_file
 
 _IMPORTS = {"engine": import_engine, "machine": import_machine}
@@ -33,7 +37,7 @@ class MapComponent(Shown):
     sources: the files that were read
     """
 
-    imported: ImportedMap
+    imported: ImportedMap | ImportedTurbo
     coverage: tuple[str, ...]
     text: str
     sources: tuple[Path, ...]
@@ -46,7 +50,11 @@ class MapComponent(Shown):
         """
         path = Path(out)
         plot = check_map_file(path, self.sources)
-        picture = map_figure(self.imported)
+        imported = self.imported
+        if isinstance(imported, ImportedTurbo):
+            picture = turbo_figure(imported)
+        else:
+            picture = map_figure(imported)
         write_whole(path, self.text.encode())
         write_whole(plot, picture)
         return plot
@@ -65,26 +73,31 @@ def import_map(
     rows: str | None = None,
     sheet: str | None = None,
     values: Mapping[str, Any] | None = None,
+    reference: tuple[float, float] | None = None,
 ) -> MapComponent:
-    """A component from measured points of an engine or a machine.
+    """A component from measured points of an engine, a machine, or of a compressor or turbine in an engine.
 
-    file: table of the points, a grid, or a .mat file of axes and matrix; kind: "engine" or "machine"
+    file: table of the points, of engine and machine also a grid or a .mat file of axes and matrix
+    kind: "engine", "machine", "compressor" or "turbine"
+    reference: of a compressor or turbine: temperature in K and pressure in Pa to which flow and speed are corrected
     like: name or file of a component that gives the remaining keys; values: key of the component -> value
     full_load, motoring, nox: FILE or FILE#SHEET of the full-load curve, the motoring curve, and NOx where `file`
     has none
-    columns, units: role (speed, torque, fuel, specific, efficiency, nox, loss, electric, full, motoring) -> name of
-    a column, its unit
+    columns, units: role (speed, torque, fuel, specific, efficiency, nox, loss, electric, full, motoring;
+    of a compressor or turbine speed, flow, ratio, efficiency, vanes) -> name of a column, its unit
     rows: "speed" or "torque", what a grid's first column holds; sheet: of a workbook
     Raises DataError where something is missing or wrong, with its place.
     """
-    if kind not in _IMPORTS:
-        raise unknown_name("kind", kind, list(_IMPORTS))
+    turbo = kind in TURBO_KINDS
+    _refuse_others(turbo, kind, rows, reference, full_load, motoring, nox)
     if rows not in (None, "speed", "torque"):
         raise DataError(f"rows = {shown(rows)}; allowed: speed, torque")
     for what, given in (("columns", columns), ("units", units)):
         for role in given or {}:
-            if role not in ROLES:
-                raise DataError(f"{what}: {unknown_name('role', role, list(ROLES))}")
+            if role not in roles_of(kind):
+                raise DataError(f"{what}: {unknown_name('role', role, list(roles_of(kind)))}")
+    if turbo:
+        return _turbo(Path(file), kind, like, columns, units, sheet, values, reference)
     path, extra = Path(file), {"full": full_load, "motoring": motoring, "nox": nox}
     source = Source(path, sheet, columns or {}, units or {}, rows)
     others = {
@@ -96,6 +109,40 @@ def import_map(
     head = [_HEAD, *digests(sources), *imported.notes, *said]
     text = component_text(head, imported.contents, imported.origins)
     return MapComponent(imported, said, text, (*sources, *map(Path, own_file(like))))
+
+
+def roles_of(kind: str) -> tuple[str, ...]:
+    """What the columns of a map may be."""
+    return TURBO_ROLES if kind in TURBO_KINDS else ROLES
+
+
+def _refuse_others(
+    turbo: bool, kind: str, rows: str | None, reference: tuple[float, float] | None, *curves: str | Path | None
+) -> None:  # fmt: skip
+    """DataError for a kind that is none, and for what belongs to another."""
+    if kind not in _IMPORTS and not turbo:
+        raise unknown_name("kind", kind, [*_IMPORTS, *TURBO_KINDS])
+    if reference is not None and not turbo:
+        raise DataError(f"--reference is for a compressor or turbine, not for {kind}; leave it out")
+    if turbo and (rows is not None or any(curve is not None for curve in curves)):
+        raise DataError(
+            f"--full-load, --motoring, --nox and --rows are for engines and machines, not for a {kind}; leave them "
+            "out"
+        )
+
+
+def _turbo(
+    path: Path, kind: str, like: str | None, columns: Mapping[str, str] | None,
+    units: Mapping[str, str] | None, sheet: str | None, values: Mapping[str, Any] | None,
+    reference: tuple[float, float] | None,
+) -> MapComponent:  # fmt: skip
+    found = import_turbo(
+        path, kind, like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
+        reference=reference,
+    )  # fmt: skip
+    head = [_HEAD, *digests([path]), f"Other keys from {like}.", *found.notes, *found.said]
+    text = component_text(head, found.contents, found.origins)
+    return MapComponent(found, found.said, text, (path, *map(Path, own_file(like))))
 
 
 def _beside(text: str, role: str, main: Source) -> Source:

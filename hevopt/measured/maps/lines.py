@@ -55,7 +55,7 @@ def in_lines(points: Points, *, proportional: bool, idle_radps: float = 0.0) -> 
     line, mean, regular = _speed_lines(points, idle_radps)
     moved = np.abs(points.speed_radps - mean[line])
     if points.rectangular or not regular:
-        line, mean = _clusters(points.speed_radps, 0.0, _SAME)
+        line, mean = clusters(points.speed_radps, 0.0, _SAME)
         moved = np.zeros(len(line))
     mean = _tidy(mean * RPM_PER_RADPS) / RPM_PER_RADPS
     mean = np.where(is_idle(mean, idle_radps), idle_radps, mean)
@@ -80,7 +80,7 @@ def _speed_lines(points: Points, idle_radps: float) -> tuple[NDArray[np.int64], 
     """Line of each point, the lines' speeds, and whether the points stand on such lines."""
     speed = points.speed_radps
     for rpm, share in ((_LINE_RPM, _LINE_SHARE), *_WIDER):
-        line, mean = _clusters(speed, rpm / RPM_PER_RADPS, share)
+        line, mean = clusters(speed, rpm / RPM_PER_RADPS, share)
         clear = rpm == _LINE_RPM or _clear(speed, line)
         idle = np.abs(mean - idle_radps) <= _LINE_RPM / RPM_PER_RADPS
         mean = np.where(idle & (idle.sum() == 1), idle_radps, mean)
@@ -124,7 +124,7 @@ def envelope_nm(lines: Lines, sign: float = 1.0) -> tuple[Array, Array]:
 
 def _averaged(points: Points, line: NDArray[np.int64], mean: Array, value: Array):
     """Points with one at each place, their lines, and what is to be said of places that had several."""
-    of_torque, torque = _clusters(points.torque_nm, 0.0, _SAME)
+    of_torque, torque = clusters(points.torque_nm, 0.0, _SAME)
     key = np.column_stack([line, of_torque])
     places, first, which, count = np.unique(
         key, axis=0, return_index=True, return_inverse=True, return_counts=True
@@ -156,7 +156,7 @@ def _said_of_repeats(points: Points, value: Array, which: Array, average: Array,
     return said
 
 
-def _clusters(values: Array, apart: float, share: float) -> tuple[NDArray[np.int64], Array]:
+def clusters(values: Array, apart: float, share: float) -> tuple[NDArray[np.int64], Array]:
     """Number of each value's cluster, and the clusters' means, rising.
 
     Neighbours are of one cluster up to a distance `apart`, or a share of the value; rounding is none.
