@@ -25,6 +25,8 @@ Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "
 class Architecture(Shown):
     """A complete car: every component, how they are joined and the functions it may use.
 
+    gearbox: with the shift speeds; None without one whose gear the cycle lists
+    machines: in the order of the driveline's
     soc_end: least state of charge at the end of a cycle
     contents: keys and values as read, changes made, the components' tables in place of their names
     files: where they were read from, the architecture first
@@ -34,7 +36,7 @@ class Architecture(Shown):
     description: str
     vehicle: Vehicle
     engine: Engine
-    gearbox: Gearbox
+    gearbox: Gearbox | None
     machines: tuple[Machine, ...]
     battery: Battery
     soc_start: float
@@ -64,6 +66,10 @@ class Architecture(Shown):
 
     def with_free_gear(self) -> "Architecture":
         """The same car with the engine's gear as a control; DataError where its gearbox does not allow it."""
+        if self.gearbox is None:
+            raise DataError(
+                f"{self.source}: gear 'free' needs a gearbox, and the architecture has none; leave it out"
+            )
         if self.gearbox.shift_fuel_kg is None:
             raise DataError(
                 f"{self.source}: gear 'free' needs the table [free_gear] with shift_fuel_g and "

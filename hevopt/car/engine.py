@@ -81,6 +81,12 @@ class Engine(Shown):
         best_nm: Array = np.interp(speed_radps, speeds, torques)
         return best_nm
 
+    def best_radps(self, power_w: Array) -> Array:
+        """Speed at which a power takes least fuel, from a grid; the fastest where no speed gives it."""
+        powers, speeds = _best_speeds(self)
+        best_radps: Array = np.interp(power_w, powers, speeds)
+        return best_radps
+
     def scaled(self, factor: float) -> "Engine":
         """The engine with `factor` times the displacement, at equal mean pressures and piston speeds."""
         return replace(
@@ -104,3 +110,16 @@ def _best_line(engine: Engine) -> tuple[Array, Array]:
     best, known = np.argmax(efficiency, axis=1), (efficiency >= 0).any(axis=1)
     known |= ~known.any()
     return speeds[known, 0], torques[np.arange(len(speeds)), best][known]
+
+
+@lru_cache(maxsize=64)
+def _best_speeds(engine: Engine) -> tuple[Array, Array]:
+    """(power,) powers, rising, and the speed at which each takes least fuel."""
+    speeds = np.linspace(engine.idle_radps, engine.speed_max_radps, 101)
+    most = np.nan_to_num(engine.covered_nm(speeds), nan=0.0)
+    powers = np.linspace(0.02, 1.0, 50) * float(np.max(most * speeds))
+    torques = powers[:, None] / speeds
+    fuel = np.where(torques <= most, engine.fuel_kgps(torques, speeds[None, :]), np.nan)
+    known = ~np.isnan(fuel).all(axis=1)
+    best = np.argmin(np.where(np.isnan(fuel[known]), np.inf, fuel[known]), axis=1)
+    return powers[known], speeds[best]

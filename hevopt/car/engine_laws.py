@@ -29,6 +29,10 @@ class EngineLaw(Protocol):
     def nox_known(self) -> bool:
         """Whether there are data on NOx."""
 
+    @property
+    def lowest_nm(self) -> float:
+        """Lowest torque, 0 or above, of which the fuel is known at every speed that is."""
+
     def fuel_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
         """Fuel flow; 0 at or below the drag torque (fuel cut), NaN outside a measured map."""
 
@@ -90,6 +94,11 @@ class CompactLaw(Shown):
     def nox_known(self) -> bool:
         """Whether there are coefficients of NOx."""
         return self.nox is not None
+
+    @property
+    def lowest_nm(self) -> float:
+        """None below 0: coefficients have no end."""
+        return 0.0
 
     def fuel_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
         """Fuel flow; 0 at or below the drag torque."""
@@ -159,6 +168,11 @@ class EngineMap(Shown):
     def nox_known(self) -> bool:
         """Whether NOx was measured."""
         return self.nox is not None
+
+    @property
+    def lowest_nm(self) -> float:
+        """The lowest torque of the map, where that is above 0."""
+        return max(0.0, float(self.torque_nm[0]))
 
     def fuel_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
         """Fuel flow; 0 at or below the drag torque, NaN outside what was measured."""

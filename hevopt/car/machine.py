@@ -59,15 +59,22 @@ class Machine(Shown):
         return np.minimum(limit, along)
 
     def loss_w(self, torque_nm: Array, speed_radps: Array) -> Array:
-        """Loss of machine and inverter, never negative; NaN outside a measured map."""
+        """Loss of machine and inverter, never negative; NaN outside a measured map.
+
+        A machine that turns backwards is the mirrored one: loss(T, -w) = loss(-T, w).
+        """
+        backwards = speed_radps < 0
+        if np.any(backwards):
+            return self.loss.loss_w(np.where(backwards, -torque_nm, torque_nm), np.abs(speed_radps))
         return self.loss.loss_w(torque_nm, speed_radps)
 
     def generating_nm(self, electric_power_w: float, speed_radps: Array) -> Array:
-        """Torque (negative) that generates an electric power >= 0 at a speed; NaN where that is too much.
+        """Torque, against the speed, that generates an electric power >= 0; NaN where that is too much.
 
         Of several such torques, the one closest to zero.
         """
-        return self.loss.generating_nm(electric_power_w, speed_radps)
+        torque = self.loss.generating_nm(electric_power_w, np.abs(speed_radps))
+        return np.where(speed_radps < 0, -torque, torque)
 
     def scaled(self, factor: float) -> "Machine":
         """The machine with `factor` times the torque and power, at equal speeds and efficiencies."""

@@ -7,6 +7,9 @@ crankshaft       P1      the same
 gearbox_input    P2      the machine on the gearbox's input, the clutch between engine and machine
 gearbox_output   P3      the machine on the wheels, through a gear of its own and the final drive
 even_shaft               two gearboxes with a clutch each; the machine on the shaft of the even gears
+power_split              engine on the carrier of a planetary set, machine on its sun, machine_2 on its ring and, by
+                         the final drive, on the wheels
+parts                    the parts as the file lists them
 """
 
 from collections.abc import Callable
@@ -16,12 +19,12 @@ from typing import Literal, NamedTuple
 
 from hevopt.car.driveline import Driveline
 from hevopt.car.machine import Machine
-from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox
+from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Planetary
 from hevopt.car.transmission import Gearbox as GearboxData
 
 CouplingKind = Literal[
-    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft"
-]
+    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft", "power_split", "parts"
+]  # fmt: skip
 _CRANK, _INPUT = "crankshaft", "gearbox input"
 
 
@@ -33,6 +36,10 @@ class Options(NamedTuple):
     machine_efficiency: float = 1.0
     disconnects_above_speed_max: bool = False
     machine_shift_fuel_kg: float = 0.0
+    planetary_ratio: float = 1.0
+    planetary_efficiency: float = 1.0
+    final_drive_ratio: float = 1.0
+    final_drive_efficiency: float = 1.0
 
 
 def crankshaft(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
@@ -90,13 +97,38 @@ def even_shaft(kind: str, options: Options, gearbox: GearboxData, machine: Machi
     return Driveline(kind, (*clutches, own, others), _CRANK, (("machine", others.first),))
 
 
-TEMPLATES: dict[CouplingKind, Callable[[str, Options, GearboxData, Machine], Driveline]] = {
+def power_split(kind: str, options: Options) -> Driveline:
+    """Input split: the carrier's speed is free, machine holds it; machine_2 and the ring's share drive."""
+    parts = (
+        Planetary(
+            "planetary set",
+            "sun",
+            "ring",
+            "carrier",
+            options.planetary_ratio,
+            options.planetary_efficiency,
+        ),
+        Gear(
+            "final drive", "ring", WHEEL, options.final_drive_ratio, options.final_drive_efficiency
+        ),
+    )
+    placed = (("machine", "sun"), ("machine_2", "ring"))
+    return Driveline(kind, parts, "carrier", placed, free_engine_speed=True)
+
+
+TEMPLATES: dict[str, Callable[[str, Options, GearboxData, Machine], Driveline]] = {
     "none": crankshaft,
     "belt": crankshaft,
     "crankshaft": crankshaft,
     "gearbox_input": gearbox_input,
     "gearbox_output": gearbox_output,
     "even_shaft": even_shaft,
+}
+WITHOUT_GEARBOX: dict[str, Callable[[str, Options], Driveline]] = {"power_split": power_split}
+# The components that a kind has beside car and battery; those of "parts" follow from its shafts.
+COMPONENTS_OF: dict[str, frozenset[str]] = {
+    **dict.fromkeys(TEMPLATES, frozenset({"engine", "gearbox", "machine"})),
+    **dict.fromkeys(WITHOUT_GEARBOX, frozenset({"engine", "machine", "machine_2"})),
 }
 
 

@@ -73,6 +73,13 @@ def way(driveline: Driveline, state: State, phase: Phase) -> Way:
         active = {name: shaft for name, shaft in active.items() if shaft not in still}
     if state.engine_on and driveline.engine is not None:
         active[ENGINE] = driveline.engine
+    if phase.standing and not set(active.values()) & _joined(uses, WHEEL):
+        # Nothing acts on what hangs on the wheels: it rests.
+        rest = _joined(uses, WHEEL) - {WHEEL}
+        uses = tuple(use for use in uses if not rest & set(use.part.shafts))
+        shafts = tuple(shaft for shaft in shafts if shaft not in rest)
+        joints = tuple(_joint(use, _any_gear(use)) for use in uses)
+        held = {shaft: how for shaft, how in held.items() if shaft not in rest}
     balance = _Balance(driveline, shafts, joints, active, standing=phase.standing)
     chosen, slack = balance.choices("free" in held.values(), follows=driveline.follows_load)
     if len(chosen) + ("free" in held.values()) > CHOICES_MAX:
@@ -125,14 +132,20 @@ def _without_dead_ends(driveline: Driveline, uses: tuple[Use, ...]) -> tuple[Use
 
 def _turning(driveline: Driveline, uses: Iterable[Use], state: State) -> set[str]:
     """The shafts that torque reaches from the wheels or from a turning engine."""
-    turning = {WHEEL, driveline.engine} if state.engine_on else {WHEEL}
-    groups = [set(use.part.shafts) for use in uses]
-    grown = True
+    turning = _joined(uses, WHEEL)
+    if state.engine_on and driveline.engine is not None:
+        turning |= _joined(uses, driveline.engine)
+    return turning
+
+
+def _joined(uses: Iterable[Use], shaft: str) -> set[str]:
+    """A shaft and all that parts join it to."""
+    joined, groups, grown = {shaft}, [set(use.part.shafts) for use in uses], True
     while grown:
-        reached = [group for group in groups if group & turning and not group <= turning]
+        reached = [group for group in groups if group & joined and not group <= joined]
         grown = bool(reached)
-        turning |= {shaft for group in reached for shaft in group}
-    return {shaft for shaft in turning if shaft is not None}
+        joined |= {other for group in reached for other in group}
+    return joined
 
 
 def _held(

@@ -1,12 +1,13 @@
 """What an architecture's file may hold: the components it names, its functions and the coupling."""
 
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, model_validator
+from pydantic import AfterValidator, Discriminator, Field, model_validator
 
 from hevopt.car.architecture import Function
-from hevopt.car.templates import CouplingKind
-from hevopt.car_files.fields import Description, Fraction, KeysOfKind, Name, Named, Ratio, Table
+from hevopt.car.templates import COMPONENTS_OF
+from hevopt.car_files.driveline import CouplingFile
+from hevopt.car_files.fields import Description, Name, Named, Table
 from hevopt.files.toml import FileModel
 
 
@@ -24,48 +25,38 @@ Component = Annotated[
 ]
 
 
-_KEYS_OF_KIND = KeysOfKind(
-    {kind: set() for kind in get_args(CouplingKind)}
-    | {
-        "gearbox_input": {"second_clutch"},
-        "gearbox_output": {"machine_ratio", "machine_efficiency"},
-    },
-    {
-        "gearbox_output": {"disconnects_above_speed_max"},
-        "even_shaft": {"machine_shift_fuel_g"},
-    },
-)
-
-
-class CouplingFile(FileModel):
-    """How the machine joins the shafts."""
-
-    model_config = ConfigDict(json_schema_extra=_KEYS_OF_KIND.schema())
-
-    kind: CouplingKind
-    second_clutch: bool | None = None
-    machine_ratio: Ratio | None = None
-    machine_efficiency: Fraction | None = None
-    disconnects_above_speed_max: bool = False
-    machine_shift_fuel_g: Annotated[float, Field(ge=0, le=10)] = 0.0
-
-    @model_validator(mode="after")
-    def _keys_of_kind(self) -> Self:
-        _KEYS_OF_KIND.check(self.kind, self.model_fields_set)
-        return self
-
-
 class ArchitectureFile(FileModel):
     """An architecture: its components, functions (Table 1) and coupling."""
 
     name: Name
     description: Description = ""
     car: Component
-    engine: Component
-    gearbox: Component
-    machine: Component
+    engine: Component | None = None
+    gearbox: Component | None = None
+    machine: Component | None = None
+    machine_2: Component | None = None
+    machine_3: Component | None = None
     battery: Component
     hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
     functions: list[Function]
     gear: Literal["cycle", "free"] = "cycle"
     coupling: CouplingFile
+
+    @model_validator(mode="after")
+    def _components(self) -> Self:
+        """The components are those of the coupling."""
+        keys = ("engine", "gearbox", "machine", "machine_2", "machine_3")
+        given = {key for key in keys if getattr(self, key) is not None}
+        kind = self.coupling.kind
+        if kind == "parts":
+            geared = [part for part in self.coupling.parts or () if part.kind == "gearbox"]
+            needed = {*self.coupling.shafts}
+            needed |= {"gearbox"} if any(part.ratios is None for part in geared) else set()
+        else:
+            needed = set(COMPONENTS_OF[kind])
+        if missing := sorted(needed - given):
+            raise ValueError(f"coupling kind {kind!r} needs {', '.join(missing)}")
+        if extra := sorted(given - needed):
+            how = "; say on which shaft, such as machine_2_shaft" if kind == "parts" else ""
+            raise ValueError(f"coupling kind {kind!r} does not use {', '.join(extra)}{how}")
+        return self

@@ -7,15 +7,17 @@ from typing import Any, NamedTuple, TypeVar
 from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import Driveline
 from hevopt.car.machine import Machine
-from hevopt.car.templates import TEMPLATES, Options
+from hevopt.car.templates import TEMPLATES, WITHOUT_GEARBOX, Options
 from hevopt.car.transmission import Gearbox
-from hevopt.car_files.architecture import ArchitectureFile, CouplingFile
+from hevopt.car_files.architecture import ArchitectureFile
 from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
 from hevopt.car_files.components import battery_of, engine_of, gearbox_of, machine_of, vehicle_of
+from hevopt.car_files.driveline import CouplingFile
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.machine import MachineFile
+from hevopt.car_files.parts import driveline_of
 from hevopt.errors import DataError
 from hevopt.files.keypaths import merged, with_changes
 from hevopt.files.lookup import find, is_path, shipped_folder
@@ -26,7 +28,8 @@ from hevopt.units import TO_SI
 Built = TypeVar("Built")
 
 
-COMPONENTS = ("car", "engine", "gearbox", "machine", "battery")
+COMPONENTS = ("car", "engine", "gearbox", "machine", "machine_2", "machine_3", "battery")
+MACHINES = ("machine", "machine_2", "machine_3")
 
 
 def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None) -> Architecture:
@@ -41,7 +44,11 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
 
-    def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built:
+    def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built | None:
+        if getattr(data, key) is None:
+            if of_parts[key]:
+                raise DataError(_not_there(path, key, of_parts[key]))
+            return None
         found = component_contents(path, key, getattr(data, key), of_parts[key])
         contents[key] = found.contents
         files.append(found.file)
@@ -51,38 +58,54 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         except DataError as error:
             raise DataError(f"{found.place}: {error}") from None
 
-    battery, soc = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
+    pack = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
     gearbox = part("gearbox", GearboxFile, gearbox_of)
     vehicle = part("car", CarFile, lambda file: vehicle_of(file, data.hybrid_mass_kg))
     engine = part("engine", EngineFile, engine_of)
-    machine = part("machine", MachineFile, machine_of)
+    machines = {key: part(key, MachineFile, machine_of) for key in MACHINES}
+    placed = {key: machine for key, machine in machines.items() if machine is not None}
+    # The model has made sure of what every architecture, and every kind of coupling, needs.
+    assert pack is not None and vehicle is not None and engine is not None
+    battery, soc = pack
     car = Architecture(
-        name=data.name,
-        description=data.description,
-        vehicle=vehicle,
-        engine=engine,
-        gearbox=gearbox,
-        machines=(machine,),
-        battery=battery,
+        data.name, data.description, vehicle, engine, gearbox, tuple(placed.values()), battery,
         soc_start=soc.start,
         soc_end=soc.start if soc.end is None else soc.end,
-        driveline=_driveline(path, data, gearbox, machine),
+        driveline=_driveline(path, data, gearbox, placed),
         functions=frozenset(data.functions),
         gear="cycle",
         contents=contents,
         files=tuple(files),
-    )
+    )  # fmt: skip
     return car.with_free_gear() if data.gear == "free" else car
 
 
-def _driveline(path: Path, data: ArchitectureFile, gearbox: Gearbox, machine: Machine) -> Driveline:
+def _driveline(
+    path: Path, data: ArchitectureFile, gearbox: Gearbox | None, machines: Mapping[str, Machine]
+) -> Driveline:
     kind = data.coupling.kind
+    if kind == "parts":
+        try:
+            return driveline_of(data.coupling, gearbox)
+        except DataError as error:
+            raise DataError(f"{path}, coupling: {error}") from None
+    options = _options(data.coupling)
+    if kind in WITHOUT_GEARBOX:
+        return WITHOUT_GEARBOX[kind](kind, options)
+    assert gearbox is not None
     if kind == "even_shaft" and len(gearbox.ratios) < 3:
         raise DataError(
             f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
             "or more; choose another gearbox or kind"
         )
-    return TEMPLATES[kind](kind, _options(data.coupling), gearbox, machine)
+    return TEMPLATES[kind](kind, options, gearbox, machines["machine"])
+
+
+def _not_there(path: Path, key: str, changes: Mapping[str, Any]) -> str:
+    return (
+        f"{path}: change of {printable(f'{key}.{next(iter(changes))}')}: this architecture has no {key}; change "
+        "another key"
+    )
 
 
 def sorted_changes(
@@ -118,7 +141,7 @@ def component_contents(
 
     def fits(stem: str) -> bool:
         """Whether a file's name, such as engine_x or my_engine, tells of no other kind of component."""
-        return key in stem or not any(other in stem for other in COMPONENTS)
+        return kind_of(key) in stem or not any(other in stem for other in COMPONENTS)
 
     try:
         found = find("architectures/components", name, ".toml", beside=folder, fits=fits)
@@ -146,4 +169,13 @@ def _options(data: CouplingFile) -> Options:
         data.machine_efficiency or 1.0,
         data.disconnects_above_speed_max,
         data.machine_shift_fuel_g * TO_SI["_g"][1],
+        data.planetary_ratio or 1.0,
+        data.planetary_efficiency,
+        data.final_drive_ratio or 1.0,
+        data.final_drive_efficiency,
     )
+
+
+def kind_of(component: str) -> str:
+    """The kind of file that a component is: every machine is one."""
+    return "machine" if component in MACHINES else component

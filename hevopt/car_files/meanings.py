@@ -17,15 +17,18 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "engine": ("", "combustion engine"),
         "gearbox": ("", "gearbox with final drive and shift speeds"),
         "machine": ("", "electric machine with its inverter"),
+        "machine_2": ("", "another one"),
+        "machine_3": ("", "a third one"),
         "battery": ("", "battery"),
         "hybrid_mass_kg": ("kg", "mass that the architecture adds to the car's"),
         "functions": ("", "what the hybrid may do; what is left out is forbidden to every strategy"),
         "gear": ("", 'who chooses the engine\'s gear: the cycle (or shift speeds), or "free": the strategy'),
-        "coupling": ("", "how the machine joins the shafts"),
+        "coupling": ("", "how engine and machines join the wheels"),
     },
     "CouplingFile": {
         "kind": ("", "where the machine sits: none (alternator), belt (on the engine), crankshaft, gearbox "
-                 "input, gearbox output, or the even shaft of a dual clutch gearbox"),
+                 "input, gearbox output, the even shaft of a dual clutch gearbox; or power_split (machine on the "
+                 "sun, machine_2 on the ring, engine on the carrier); or parts, listed one by one"),
         "second_clutch": ("", "a clutch between engine and machine, so that electric driving does not drag "
                           "the engine; kind gearbox_input only"),
         "machine_ratio": ("-", "machine speed over gearbox output speed; kind gearbox_output only"),
@@ -33,6 +36,31 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "disconnects_above_speed_max": ("", "the machine is uncoupled above its highest speed instead of "
                                         "limiting the car; kind gearbox_output only"),
         "machine_shift_fuel_g": ("g", "fuel that a change of the machine's gear counts; kind even_shaft only"),
+        "planetary_ratio": ("-", "teeth of the ring over teeth of the sun; kind power_split"),
+        "planetary_efficiency": ("-", "efficiency of the rolling power; kind power_split"),
+        "final_drive_ratio": ("-", "speed of the ring over that of the wheels; kind power_split"),
+        "final_drive_efficiency": ("-", "efficiency of the final drive; kind power_split"),
+        "engine_shaft": ("", "name of the shaft that the engine turns; kind parts only"),
+        "machine_shaft": ("", "name of the shaft of the machine; kind parts only"),
+        "machine_2_shaft": ("", "the same of machine_2"),
+        "machine_3_shaft": ("", "the same of machine_3"),
+        "parts": ("", "what joins the shafts; a shaft is a name, and the wheels' is wheel; kind parts only"),
+    },
+    "PartFile": {
+        "kind": ("", "gear (a pair of gears, a final drive, an axle), gearbox, clutch, one_way_clutch, planetary, "
+                 "shaft_brake"),
+        "name": ("", "name shown in messages"),
+        "first": ("", "the shaft on its input side; of a shaft brake the one that it holds"),
+        "second": ("", "the other shaft; a one_way_clutch without it keeps first from turning backwards"),
+        "sun": ("", "shaft of the sun; planetary only"),
+        "ring": ("", "shaft of the ring; planetary only"),
+        "carrier": ("", "shaft of the carrier; planetary only"),
+        "ratio": ("-", "speed of first over that of second; of a planetary set teeth of the ring over the sun's"),
+        "ratios": ("-", "of a gearbox whose gear the strategy chooses, or neutral; without them it is the "
+                   "architecture's gearbox, in the gear that the cycle lists"),
+        "efficiency": ("-", "share of the power that it passes on; of a planetary set, of the rolling power"),
+        "operation": ("", "whose a clutch is: driver's (slips at launches, open in neutral), or strategy's"),
+        "shift_fuel_g": ("g", "fuel that a change of gear counts; gearbox with ratios only"),
     },
     "CarFile": {
         "name": _NAME,

@@ -12,6 +12,7 @@ from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
+from hevopt.car_files.load import kind_of
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.meanings import MEANINGS
 from hevopt.errors import unknown_name
@@ -65,7 +66,7 @@ def _table(name: str, table: dict[str, Any]) -> dict[str, Any]:
             del found["default"]
         found.pop("title", None)
         if {"additionalProperties": True, "type": "object"} in found.get("oneOf", []):
-            found = {"oneOf": [_NAMED, _file_and_changes(MODELS[key].__name__)]}
+            found = {"oneOf": [_NAMED, _file_and_changes(MODELS[kind_of(key)].__name__)]}
         keys[key] = {"description": f"{meaning} ({unit})" if unit.strip("-") else meaning} | found
         if unit:
             keys[key]["x-unit"] = unit

@@ -17,7 +17,7 @@ from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
 
 from hevopt.car_files import schema as file_schema
-from hevopt.car_files.load import COMPONENTS, component_contents, load_architecture
+from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, load_architecture
 from hevopt.car_files.meanings import MEANINGS
 from hevopt.errors import DataError, unknown_name
 from hevopt.files.lookup import grouped_names, read_text, shipped_folder, shipped_names
@@ -53,7 +53,7 @@ def new_files(
     original = load_architecture(like).source
     contents, texts = read_contents(original), {}
     references: dict[str, str | dict[str, Any]] = {}
-    for key in COMPONENTS:
+    for key in filter(contents.get, COMPONENTS):
         found = component_contents(original, key, contents[key], {})
         if key in copied:
             references[key] = own = f"{name}_{key}"
@@ -144,7 +144,7 @@ def _component_help(name: str, path: str, copied: Sequence[str]) -> list[str]:
         '  engine = { file = "engine_diesel_1600", scale = { displacement = 1.25 } }',
         *textwrap.wrap(f"scale: {scale}; a machine likewise.", _WIDTH - 4),
     ]
-    rest = [key for key in COMPONENTS if key not in copied]
+    rest = [key for key in ("car", "battery") if key not in copied]
     if rest:
         lines.append(
             f"A component as a file to edit: hevopt architectures new {name}2 --like {path} "
@@ -161,7 +161,7 @@ def _component_text(name: str, key: str, original: Path, contents: Mapping[str, 
         "",
     ]
     tables = file_schema.schema()["$defs"]
-    model = file_schema.MODELS[key].__name__
+    model = file_schema.MODELS[kind_of(key)].__name__
     return "\n".join([*head, *_table_lines(model, contents, notes, (), tables)]) + "\n"
 
 
@@ -208,7 +208,7 @@ def _table_lines(
 
 def _shipped_components(key: str) -> list[str]:
     folder = shipped_folder("architectures") / "components"
-    return sorted(path.stem for path in folder.glob(f"{key}_*.toml"))
+    return sorted(path.stem for path in folder.glob(f"{kind_of(key)}_*.toml"))
 
 
 def _inner_table(shape: Mapping[str, Any]) -> str | None:
@@ -228,7 +228,7 @@ def _toml(value: Any) -> str:
     if not isinstance(value, list):
         return str(tomlkit.item(value).as_string())
     inner = [_toml(entry) for entry in value]
-    if any(isinstance(entry, list) for entry in value):
+    if any(isinstance(entry, list | Mapping) for entry in value):
         return "[\n" + "".join(f"  {row},\n" for row in inner) + "]"
     text = ", ".join(inner)
     if len(text) <= _WIDTH:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from hevopt.car_files.load import COMPONENTS, component_contents, load_architecture
+from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, load_architecture
 from hevopt.car_files.schema import MODELS
 from hevopt.driving.cycle import IMPORT, faults_in, load_cycle
 from hevopt.errors import DataError, Fault
@@ -113,7 +113,7 @@ def architecture_faults(path: Path, contents: dict[str, Any], kind: str) -> tupl
             except DataError as error:
                 faults += error.listed
                 continue
-            faults += table_faults(part.place, part.contents, MODELS[key])
+            faults += table_faults(part.place, part.contents, MODELS[kind_of(key)])
     if faults:
         return faults, ""
     car = load_architecture(path.absolute() if path.suffix != ".toml" else path)

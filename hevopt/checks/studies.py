@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hevopt.car_files.load import COMPONENTS, component_contents, sorted_changes
+from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, sorted_changes
 from hevopt.car_files.schema import MODELS
 from hevopt.checks.files import (
     ARCHITECTURE,
@@ -139,7 +139,7 @@ def _part_faults(
     except DataError as error:
         return [f"{place}: {line}" for line in error.listed]
     table, faults = _changed(place, plain, changes, f"{key}.")
-    return faults + table_faults(place, table, MODELS[key])
+    return faults + table_faults(place, table, MODELS[kind_of(key)])
 
 
 def _changed(

@@ -54,17 +54,23 @@ class Demand(Shown):
         return replace(self, gear=gear)
 
 
-def demand_of(cycle: Cycle, vehicle: Vehicle, gearbox: Gearbox) -> Demand:
-    """The cycle's demand on this car, with the cycle's gears or, without any, the shift speeds'."""
+def demand_of(cycle: Cycle, vehicle: Vehicle, gearbox: Gearbox | None) -> Demand:
+    """The cycle's demand on this car, with the cycle's gears or, without any, the shift speeds'.
+
+    A car without a gearbox has gear 0 and no clutch.
+    """
     step_s = np.diff(cycle.time_s)
     speed = (cycle.speed_mps[1:] + cycle.speed_mps[:-1]) / 2
     accel = np.diff(cycle.speed_mps) / step_s
     force = tractive_force_n(vehicle, speed, accel, cycle.grade[:-1])
-    if cycle.gear is None or cycle.clutch_open is None:
+    if gearbox is None:
+        gear = np.zeros(len(step_s), dtype=np.int64)
+        clutch_open = np.zeros(len(step_s), dtype=np.bool_)
+    elif cycle.gear is None or cycle.clutch_open is None:
         gear, clutch_open = gears_from_shift_speeds(gearbox, cycle.time_s, cycle.speed_mps)
     else:
         gear, clutch_open = cycle.gear[:-1], cycle.clutch_open[:-1]
-    if gear.max() >= len(gearbox.ratios):
+    if gearbox is not None and gear.max() >= len(gearbox.ratios):
         k = int(np.argmax(gear >= len(gearbox.ratios)))
         raise DataError(
             f"cycle {cycle.name}, t = {cycle.time_s[k]:g} s: gear {gear[k]}; gearbox "

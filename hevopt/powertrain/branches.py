@@ -10,23 +10,28 @@ from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
+from hevopt.powertrain.evaluated import evaluated
+from hevopt.powertrain.grids import Gridded, gridded, is_gridded, most_nm
 from hevopt.powertrain.levels import Around, labels, levels_of
-from hevopt.powertrain.operation import Setting, completed, flowing, setting
-from hevopt.powertrain.phases import Driver, driver_of, stretches
-from hevopt.powertrain.rejects import Bits, bits, function_rejects, limit_rejects
-from hevopt.problem.arrays import Array
+from hevopt.powertrain.operation import Setting, setting
+from hevopt.powertrain.packing import packed
+from hevopt.powertrain.phases import Driver, Stretch, driver_of, stretches
+from hevopt.powertrain.rejects import Bits, bits
+from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.battery import within_limits
 from hevopt.problem.reject import Reject
-
-_ROUNDING_W = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Piece(Shown):
-    """The steps at which a branch drives in one way, and the torques given there, (state, level) by actuator."""
+    """The states at which a branch drives in one way, and the torques given there, (state, level) by actuator.
+
+    slot: (state,) the only level of each state; None where every state has all levels
+    """
 
     here: Setting
     given: Mapping[str, Array]
+    slot: Indices | None = None
 
 
 class Driven(NamedTuple):
@@ -39,13 +44,17 @@ class Driven(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Branch(Shown):
-    """All controls of one state; arrays (time, level)."""
+    """All controls of one state; arrays (time, level).
+
+    points: of a state whose levels are chosen among more points, all of them
+    """
 
     driven: Driven
     fuel_kg: Array
     nox_kg: Array
     battery_power_w: Array
     reject: Bits
+    points: tuple[Gridded, ...] = ()
 
 
 def branches(car: Architecture, demand: Demand, levels: int, around: Around | None) -> list[Branch]:
@@ -85,39 +94,61 @@ def _needs_gear(car: Architecture, driver: Driver) -> bool:
 def _branch(
     car: Architecture, driver: Driver, state: State, levels: int, around: Around | None
 ) -> Branch:
-    named = labels(car.driveline.follows_load, state, levels, around)
+    found, follows = stretches(car, driver, state), car.driveline.follows_load
+    if any(is_gridded(stretch.way, follows_load=follows) for stretch in found):
+        return _packed_branch(car, driver, state, found, levels, around)
+    named = labels(follows, state, levels, around)
     demand = driver.demand
     shape = len(demand.time_s), len(named)
     fuel, nox, power = (np.zeros(shape) for _ in range(3))
     reject = np.full(shape, int(Reject.NO_PATH), dtype=np.uint16)
     pieces = []
-    for stretch in stretches(car, driver, state):
+    for stretch in found:
         here = setting(car, stretch.way, stretch.shafts)
-        chosen = levels_of(here, state, levels, around)
-        torques, step = completed(here, chosen.given), stretch.step
-        flows, step_s = flowing(here, torques), demand.step_s[step][:, None]
-        battery = flows.machines_w + car.vehicle.auxiliary_power_w
-        # What an alternator that follows its load leaves to the battery is rounding, not charge.
-        battery = np.where(np.abs(battery) < _ROUNDING_W, 0.0, battery)
-        fuel[step] = flows.fuel_kgps * step_s
-        nox[step] = flows.nox_kgps * step_s
-        power[step] = battery
-        reject[step] = (
-            bits(Reject.ENGINE_MAP, flows.off_engine_map)
-            | bits(Reject.MACHINE_MAP, flows.off_machine_map)
-            | limit_rejects(here, torques)
-            | function_rejects(here, state, torques, battery)
-            | bits(Reject.DUPLICATE, chosen.repeats)
-        )
+        chosen, step = levels_of(here, state, levels, around), stretch.step
+        done = evaluated(here, state, chosen.given, demand.step_s)
+        fuel[step], nox[step], power[step] = done.fuel_kg, done.nox_kg, done.battery_w
+        reject[step] = done.reject | bits(Reject.DUPLICATE, chosen.repeats)
         pieces.append(Piece(here, chosen.given))
     reject |= bits(Reject.BATTERY_LIMIT, ~within_limits(car.battery, power))
     return Branch(Driven(state, named, tuple(pieces)), fuel, nox, power, reject)
 
 
-def deliverable_nm(car: Architecture, branch: Branch, steps: int) -> Array:
-    """(time,) largest wheel torque of a branch: machines at their limit, engine at full load or its map's end."""
-    result = np.zeros(steps)
-    for piece in branch.driven.pieces:
+def _packed_branch(
+    car: Architecture,
+    driver: Driver,
+    state: State,
+    found: list[Stretch],
+    levels: int,
+    around: Around | None,
+) -> Branch:
+    """The controls of a state that has more points than a table needs: those that no other beats."""
+    points: list[Gridded] = []
+    step_s = driver.demand.step_s
+    for stretch in found:
+        if is_gridded(stretch.way, follows_load=car.driveline.follows_load):
+            points += gridded(car, driver, stretch, state, levels)
+            continue
+        here = setting(car, stretch.way, stretch.shafts)
+        chosen = levels_of(here, state, levels, around)
+        done = evaluated(here, state, chosen.given, step_s)
+        points.append(Gridded(here, chosen.given, done, chosen.repeats))
+    left = packed(points, len(step_s), car.battery)
+    pieces = tuple(Piece(*kept) for kept in left.kept)
+    named = tuple(f"point {n}" for n in range(left.reject.shape[1]))
+    driven = Driven(state, named, pieces)
+    return Branch(driven, *left[:4], tuple(points))
+
+
+def deliverable_nm(car: Architecture, branch: Branch, stuck: Flags) -> Array:
+    """(time,) largest wheel torque of a branch: machines at their limit, engine at full load or its map's end.
+
+    stuck: (time,) the steps where it is asked for
+    """
+    result = np.zeros(len(stuck))
+    for points in branch.points:
+        np.maximum.at(result, *most_nm(points, stuck))
+    for piece in () if branch.points else branch.driven.pieces:
         here = piece.here
         if here.way.slack is not None:
             names = {*here.way.chosen, here.way.slack}

@@ -39,8 +39,11 @@ class PowerFlows(Flows):
         for branch in self.branches:
             width = len(branch.labels)
             for piece in branch.pieces:
-                step = piece.here.shafts.step
-                whole[step, first : first + width] = self._of(piece.here, piece.given)[name]
+                step, values = piece.here.shafts.step, self._of(piece.here, piece.given)[name]
+                if piece.slot is None:
+                    whole[step, first : first + width] = values
+                else:
+                    whole[step, first + piece.slot] = np.broadcast_to(values, (len(step), 1))[:, 0]
             first += width
         return whole
 
@@ -89,9 +92,14 @@ class PowerFlows(Flows):
             first += width
             for piece in branch.pieces:
                 of_piece = level[piece.here.shafts.step]
-                state = np.flatnonzero((of_piece >= 0) & (of_piece < width))
+                if piece.slot is None:
+                    state = np.flatnonzero((of_piece >= 0) & (of_piece < width))
+                    taken = of_piece[state]
+                else:
+                    state = np.flatnonzero(of_piece == piece.slot)
+                    taken = np.zeros(len(state), dtype=np.int64)
                 if len(state):
-                    yield piece, state, of_piece[state]
+                    yield piece, state, taken
 
     def _of(self, here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
         """name -> flows of (state, level) torques given, some (state, 1)."""

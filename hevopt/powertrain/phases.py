@@ -133,7 +133,10 @@ def _opened(
         return [(frozenset(), step)]
     whole = way(car.driveline, state, phase)
     closed = shafts_of(car, driver.demand, whole, step, driver.launch_radps)
-    fast = np.array([closed.speed_radps[part.first] > part.speed_max_radps for part in limited])
+    rest = np.zeros(len(step))
+    fast = np.array(
+        [closed.speed_radps.get(part.first, rest) > part.speed_max_radps for part in limited]
+    )
     codes = (1 << np.arange(len(limited))) @ fast
     return [
         (

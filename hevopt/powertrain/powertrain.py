@@ -27,6 +27,8 @@ from hevopt.problem.table import Control, ControlTable, Signals
 
 TORQUE_LEVELS = 41
 _SHORTFALL_PASSES = 5
+# Share of the demand by which a step is lowered where limits lie between gridded controls.
+_STEP_DOWN = 0.03
 
 
 def build_problem(
@@ -46,10 +48,9 @@ def build_problem(
     `allow_shortfall` such steps are driven with what the powertrain can give, and marked in the table.
     """
     demand = demand_of(cycle, architecture.vehicle, architecture.gearbox)
-    if cycle.gear is None and architecture.gear == "cycle":
-        demand = change_down(
-            demand, architecture.vehicle, architecture.engine, architecture.gearbox
-        )
+    gearbox = architecture.gearbox
+    if cycle.gear is None and architecture.gear == "cycle" and gearbox is not None:
+        demand = change_down(demand, architecture.vehicle, architecture.engine, gearbox)
     table = build_table(
         architecture, demand, levels=levels, allow_shortfall=allow_shortfall, around=around
     )
@@ -117,9 +118,12 @@ def _missing_nm(
     architecture: Architecture, demand: Demand, found: list[Branch], stuck: Flags
 ) -> Array:
     """(time,) wheel torque beyond what any state delivers at the steps without a control; else 0."""
-    limits = [deliverable_nm(architecture, branch, len(demand.gear)) for branch in found]
+    limits = [deliverable_nm(architecture, branch, stuck) for branch in found]
     short = demand.wheel_torque_nm - np.max(limits, axis=0)
     missing: Array = np.where(stuck, np.maximum(short, 0.0), 0.0)
+    if any(branch.points for branch in found):
+        least = _STEP_DOWN * np.maximum(demand.wheel_torque_nm, 0.0)
+        missing = np.where(stuck, np.maximum(missing, least), 0.0)
     return missing
 
 

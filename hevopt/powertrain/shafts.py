@@ -74,15 +74,16 @@ def shafts_of(
     }
     inputs |= {shaft: held[how] for shaft, how in way.held.items()}
     accel = {WHEEL: demand.wheel_accel_radps2[step]}
-    speeds = {shaft: _value(ratios[shaft], inputs, gear) for shaft in way.shafts}
-    accels = {shaft: _value(ratios[shaft], accel, gear) for shaft in way.shafts}
+    speeds = {shaft: value_of(ratios[shaft], inputs, gear) for shaft in way.shafts}
+    accels = {shaft: value_of(ratios[shaft], accel, gear) for shaft in way.shafts}
     wheel_nm = demand.wheel_torque_nm[step]
     acting, inertia_w = _inertia(car, way, gear, speeds, accels)
     acting[WHEEL] = acting[WHEEL] + wheel_nm if WHEEL in acting else wheel_nm
     return Shafts(step, gear, speeds, accels, acting, inertia_w, wheel_nm)
 
 
-def _value(terms: Terms, inputs: Mapping[str, Array], gear: Indices) -> Array:
+def value_of(terms: Terms, inputs: Mapping[str, Array], gear: Indices) -> Array:
+    """(state,) a speed from its terms and the inputs known, in the gear of each state."""
     total = np.zeros(gear.shape)
     for name, values in inputs.items():
         if name in terms:
@@ -119,7 +120,7 @@ def _inertia(
             continue
         on, torque = shaft, inertia * accels[shaft]
         if line.free_engine_speed:
-            ratio = _value(speeds_of(way)[shaft], {WHEEL: np.ones(gear.shape)}, gear)
+            ratio = value_of(speeds_of(way)[shaft], {WHEEL: np.ones(gear.shape)}, gear)
             on, torque = WHEEL, inertia * ratio**2 * accels[WHEEL]
         torques[on] = torques[on] + torque if on in torques else torque
         powers[owner] = powers[owner] + torque * speeds[on]

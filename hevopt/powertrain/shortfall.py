@@ -25,26 +25,31 @@ def shortfall_message(
     """
     steps = np.flatnonzero(stuck)
     lines = []
+
+    def gear(k: int) -> str:
+        return f"gear {demand.gear[k]}, " if architecture.gearbox is not None else ""
+
     for k in steps[:_LISTED]:
         counts = {word: int(np.sum(reject[k] & bit > 0)) for bit, word in REJECT_WORDS.items()}
         reasons = ", ".join(f"{word} {count}" for word, count in counts.items() if count)
         torque = f", {missing[k]:.0f} Nm missing at the wheels" if missing[k] > 0 else ""
         lines.append(
-            f"t = {demand.time_s[k]:g} s: {demand.speed_mps[k] * 3.6:.1f} km/h, gear "
-            f"{demand.gear[k]}, {demand.wheel_power_w[k] / 1e3:.1f} kW at the wheels"
+            f"t = {demand.time_s[k]:g} s: {demand.speed_mps[k] * 3.6:.1f} km/h, {gear(k)}"
+            f"{demand.wheel_power_w[k] / 1e3:.1f} kW at the wheels"
             f"{torque} (of {reject.shape[1]} controls rejected: {reasons})"
         )
     more = len(steps) - len(lines)
     lines += [f"and {more} more"] if more else []
+    neutral = stuck & (demand.gear == 0) & (demand.wheel_torque_nm > 0)
+    neutral &= architecture.gearbox is not None
     return (
         f"architecture {architecture.name} cannot follow the cycle at {len(steps)} of "
-        f"{len(stuck)} steps:\n  " + "\n  ".join(lines + _advice(demand, stuck, missing, reject))
+        f"{len(stuck)} steps:\n  " + "\n  ".join(lines + _advice(neutral, stuck, missing, reject))
     )
 
 
-def _advice(demand: Demand, stuck: Flags, missing: Array, reject: Bits) -> list[str]:
+def _advice(neutral: Flags, stuck: Flags, missing: Array, reject: Bits) -> list[str]:
     """What to do, by what is wrong: the cycle's gear, too little torque, or a limit."""
-    neutral = stuck & (demand.gear == 0) & (demand.wheel_torque_nm > 0)
     weak, limited = stuck & ~neutral & (missing > 0), stuck & ~neutral & (missing == 0)
     advice = []
     if neutral.any():

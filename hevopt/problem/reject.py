@@ -17,6 +17,7 @@ class Reject(IntFlag):
     DUPLICATE = 256
     GIVEN = 512
     MACHINE_MAP = 1024
+    BEATEN = 2048
 
 
 REJECT_WORDS: dict[Reject, str] = {
@@ -31,4 +32,5 @@ REJECT_WORDS: dict[Reject, str] = {
     Reject.DUPLICATE: "same as another control",
     Reject.GIVEN: "marked as not feasible",
     Reject.MACHINE_MAP: "outside the machine map",
+    Reject.BEATEN: "beaten by another control",
 }

@@ -103,12 +103,12 @@ def test_a_measured_map_is_copied_cell_by_cell(tmp_path):
     [
         ("a b", {}, "allowed: up to 60 letters, digits, - and _"),
         ("../x", {}, "allowed: up to 60 letters"),
-        ("c2", {}, "that of a shipped one (A, B, C1, C2, D, E, compact_1300)"),
+        ("c2", {}, "that of a shipped one (A, B, C1, C2, D, E, prius_1998, "),
         ("mine", {"like": "C3"}, "close matches: C2"),
         (
             "mine",
             {"components": ["motor"]},
-            "available: car, engine, gearbox, machine, battery, all",
+            "available: car, engine, gearbox, machine, machine_2, machine_3, battery, all",
         ),
         ("mine", {"out": Path("mine.txt")}, "an architecture is a .toml file"),
     ],

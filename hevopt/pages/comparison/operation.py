@@ -1,5 +1,6 @@
 """What a trajectory does: modes of operation, spells of engine on and off, limits touched."""
 
+from collections.abc import Mapping
 from itertools import groupby
 
 import numpy as np
@@ -85,8 +86,6 @@ def limits_touched(car: Architecture, problem: Problem, trajectory: Trajectory) 
     f, pack = trajectory.flows, problem.battery
     torque, speed = f["engine_torque_nm"], f["engine_speed_radps"]
     fired = f["fuel_power_w"] > 0
-    machine_torque, machine_speed = f["machine_torque_nm"], f["machine_speed_radps"]
-    limit = car.machines[0].limit_nm(machine_speed)
     current = f["battery_current_a"]
     width = _WINDOW_NEAR * (pack.soc_max - pack.soc_min)
     low, high = (
@@ -97,13 +96,25 @@ def limits_touched(car: Architecture, problem: Problem, trajectory: Trajectory) 
         "engine full load": fired & (torque >= (1 - _NEAR) * car.engine.full_load_nm(speed)),
         "engine top speed": speed >= (1 - _NEAR) * car.engine.speed_max_radps,
         "edge of the engine map": fired & car.engine.law.near_edge(torque, speed, _NEAR),
-        "machine torque or power": (np.abs(machine_torque) >= (1 - _NEAR) * limit)
-        & (np.abs(machine_torque) > 0),
-        "machine top speed": machine_speed >= (1 - _NEAR) * car.machines[0].speed_max_radps,
+        **_near_machine_limits(car, f),
         "battery power": _near_battery_limit(problem, trajectory.battery_power_w, current),
         "SOC window": low | high,
     }  # fmt: skip
     return {name: int(np.sum(steps)) for name, steps in near.items() if steps.any()}
+
+
+def _near_machine_limits(
+    car: Architecture, flows: Mapping[str, Array]
+) -> dict[str, NDArray[np.bool_]]:
+    names = [name for name, _ in car.driveline.machines]
+    near = {}
+    for name, machine in zip(names, car.machines, strict=True):
+        torque, speed = np.abs(flows[f"{name}_torque_nm"]), np.abs(flows[f"{name}_speed_radps"])
+        shown = name.replace("_", " ")
+        limit = machine.limit_nm(speed)
+        near[f"{shown} torque or power"] = (torque >= (1 - _NEAR) * limit) & (torque > 0)
+        near[f"{shown} top speed"] = speed >= (1 - _NEAR) * machine.speed_max_radps
+    return near
 
 
 def _near_battery_limit(problem: Problem, power: Array, current: Array) -> NDArray[np.bool_]:

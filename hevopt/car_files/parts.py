@@ -1,0 +1,80 @@
+"""A driveline from the parts that an architecture's file lists, each state of it tried."""
+
+from hevopt.car.driveline import Driveline, Phase
+from hevopt.car.parts import (
+    Clutch,
+    Gear,
+    Gearbox,
+    OneWayClutch,
+    Part,
+    Planetary,
+    ShaftBrake,
+)
+from hevopt.car.transmission import Gearbox as GearboxData
+from hevopt.car.ways import way
+from hevopt.car_files.driveline import CouplingFile, PartFile
+from hevopt.errors import DataError
+from hevopt.units import TO_SI
+
+
+def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
+    """The driveline of a coupling of kind "parts"; DataError, naming parts, where it cannot be driven.
+
+    An engine whose speed no driver's clutch ties to a gearbox has a speed to choose.
+    """
+    parts = tuple(_part(part, gearbox) for part in data.parts or ())
+    shafts = data.shafts
+    machines = tuple((name, shaft) for name, shaft in shafts.items() if name != "engine")
+    driven = any(isinstance(part, Clutch) and part.operation == "driver" for part in parts)
+    engine = shafts.get("engine")
+    line = Driveline("parts", parts, engine, machines, engine is not None and not driven)
+    for state in line.states():
+        for phase in _phases(line):
+            way(line, state, phase)
+    return line
+
+
+def _phases(line: Driveline) -> list[Phase]:
+    boxes = [box.name for box in line.boxes if box.choice != "free"]
+    driving = [
+        Phase(False, clutch, box) for box in boxes for clutch in ("closed", "slipping", "open")
+    ]
+    return [Phase(True), Phase(False), *driving]
+
+
+def _part(data: PartFile, gearbox: GearboxData | None) -> Part:
+    first, second = data.first or "", data.second or ""
+    if data.kind == "gear":
+        return Gear(data.name, first, second, data.ratio or 1.0, data.efficiency)
+    if data.kind == "planetary":
+        sun, ring, carrier = data.sun or "", data.ring or "", data.carrier or ""
+        return Planetary(data.name, sun, ring, carrier, data.ratio or 1.0, data.efficiency)
+    if data.kind == "clutch":
+        return Clutch(data.name, first, second, data.operation or "strategy")
+    if data.kind == "one_way_clutch":
+        return OneWayClutch(data.name, first, data.second)
+    if data.kind == "shaft_brake":
+        return ShaftBrake(data.name, first)
+    return _gearbox(data, gearbox)
+
+
+def _gearbox(data: PartFile, gearbox: GearboxData | None) -> Gearbox:
+    """With ratios of its own, gears that the strategy chooses; else the architecture's gearbox, as listed."""
+    first, second = data.first or "", data.second or ""
+    if data.ratios is None:
+        if gearbox is None:
+            raise DataError(f"{data.name}: give its ratios, or the architecture a gearbox")
+        numbers = tuple(range(1, len(gearbox.ratios)))
+        ratios, efficiency = (tuple(map(float, v)) for v in (gearbox.ratios, gearbox.efficiency))
+        return Gearbox(data.name, first, second, ratios, efficiency, numbers, "listed")
+    numbers = tuple(range(1, len(data.ratios) + 1))
+    return Gearbox(
+        data.name,
+        first,
+        second,
+        (1.0, *data.ratios),
+        (1.0,) + (data.efficiency,) * len(data.ratios),
+        numbers,
+        "free",
+        data.shift_fuel_g * TO_SI["_g"][1],
+    )
