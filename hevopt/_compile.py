@@ -10,15 +10,19 @@ that is spoilt, or older than any of the loops, is passed over and replaced by w
 import hashlib
 import pickle
 import shutil
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
+from numba.core.environment import Environment, _rebuild_env
+from numba.core.runtime import rtsys
 
 _DIGEST_BYTES = hashlib.sha256().digest_size
 # Files of loops, and of the tuples and constants that they are compiled with.
@@ -57,9 +61,12 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        # Whatever a file of another making holds, the loop can be compiled.
+        # What is compiled needs numba's runtime, but none of its registries, whose reading takes longer than all
+        # else of a short command; who compiles reads them first. Whatever a file of another making holds, the loop
+        # can be compiled.
         with suppress(Exception):
-            return super().load_overload(sig, target_context)
+            rtsys.initialize(target_context)
+            return self._load_overload(sig, target_context)
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -75,7 +82,7 @@ class _Files(IndexDataCacheFile):  # type: ignore[misc]
         path = self._path(key)
         kept = path.read_bytes() if path.is_file() else b""
         digest, contents = kept[:_DIGEST_BYTES], kept[_DIGEST_BYTES:]
-        return pickle.loads(contents) if digest == self._digest(contents) else None
+        return _Unpickler(BytesIO(contents)).load() if digest == self._digest(contents) else None
 
     def save(self, key: Any, data: Any) -> None:
         """Keep what was compiled in place of what is there."""
@@ -92,6 +99,24 @@ class _Files(IndexDataCacheFile):  # type: ignore[misc]
     def _digest(self, contents: bytes) -> bytes:
         stamp = repr((self._version, self._source_stamp, _loops_digest())).encode()
         return hashlib.sha256(stamp + contents).digest()
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads a compiled loop without what it was compiled from."""
+
+    def find_class(self, module: str, name: str, /) -> Any:
+        rebuild = (module, name) == (Environment.__module__, "_rebuild_env")
+        return _environment if rebuild else super().find_class(module, name)
+
+
+def _environment(module: str, constants: list[Any], name: str) -> Any:
+    """The constants of a loop. It reads no globals, so that the part of numba they are of need not be there."""
+    if module in sys.modules or name in Environment._memo:
+        return _rebuild_env(module, constants, name)
+    made = Environment({"__name__": module})
+    made.consts[:], made.env_name = constants, name
+    Environment._memo[name] = made
+    return made
 
 
 @cache

@@ -154,3 +154,45 @@ def test_compiled_loops_compute_what_their_text_says_to_the_last_bit():
         check=True, capture_output=True, text=True,
     )  # fmt: skip
     assert figures().split() == plain.stdout.split()
+
+
+SUMS = """
+import sys
+import numpy as np
+from hevopt._compile import compiled
+
+@compiled()
+def sums(x):
+    if len(x) == 0:
+        raise ValueError("nothing to add up")
+    return np.sum(x) + np.sort(x)[0]
+
+@compiled()
+def mean(x):
+    return np.mean(x)
+
+x = np.arange(5.0)
+print(sums(x), "numba.np.arraymath" in sys.modules, sum(sums.stats.cache_hits.values()))
+try:
+    sums(x[:0])
+except ValueError as error:
+    print(error)
+if sys.argv[1:]:
+    print(mean(x), sums(x.astype(np.float32)))
+"""
+
+
+def test_a_kept_loop_is_loaded_without_the_parts_of_numba_that_only_compiling_needs(tmp_path):
+    (tmp_path / "sums.py").write_text(SUMS)
+
+    def said(*arguments: str) -> list[str]:
+        done = subprocess.run(
+            [sys.executable, "sums.py", *arguments],
+            cwd=tmp_path, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        return done.stdout.splitlines()
+
+    assert said() == ["10.0 True 0", "nothing to add up"]
+    assert said() == ["10.0 False 1", "nothing to add up"]
+    # And compiling after loading, with other types and another loop, still works.
+    assert said("more") == ["10.0 False 1", "nothing to add up", "2.0 10.0"]
