@@ -21,10 +21,16 @@ def _problem(architecture: str, cycle: str):
 
 
 @cache
-def _comparison(cycle: str):
+def _compared(cycle: str):
+    """A comparison, and its trajectories by car and strategy."""
     from hevopt import compare
 
-    return compare(cycle, allow_shortfall=True)
+    driven = {}
+
+    def observe(case, row, plan, trajectory):
+        driven[row.architecture, row.strategy] = trajectory
+
+    return compare(cycle, allow_shortfall=True, observe=observe), driven
 
 
 @pytest.fixture
@@ -36,7 +42,13 @@ def problem_of():
 @pytest.fixture
 def comparison_of():
     """cycle -> comparison of everything on it, cached over the whole run."""
-    return _comparison
+    return lambda cycle: _compared(cycle)[0]
+
+
+@pytest.fixture
+def driven_of():
+    """cycle -> (architecture, strategy) -> trajectory of that comparison."""
+    return lambda cycle: _compared(cycle)[1]
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ def test_spoilt_files_give_a_result_or_one_message():
         (Seen(2, "", "Traceback (most recent call last):", 0.1, 1), "a traceback"),
         (Seen(2, "", "", 0.1, 1), "without a message"),
         (Seen(0, "", "", 11.0, 1), "took 11.0 s"),
-        (Seen(0, "", "", 0.1, 1, 61.0), "did not end within 60 s"),
+        (Seen(0, "", "", 0.1, 1, 301.0), "did not end within 300 s"),
         (Seen(0, "", "", 0.1, 3_000_000_000), "3.00 GB"),
         (Seen(-9, "", "", 0.1, 1), "status -9"),
         (Seen(2, "", "hevopt: error: \x1b[2J", 0.1, 1), "control characters"),

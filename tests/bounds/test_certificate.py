@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import CYCLES, HYBRIDS
+from conftest import HYBRIDS
 from problems import every_plan, random_problem
 
 from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
-from hevopt.bounds.certificate import TARGET_GAP, Claim, Proof, Scope
+from hevopt.bounds.certificate import Claim, Proof, Scope
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual, dual_of_shape, lp_dual
@@ -17,7 +17,9 @@ from hevopt.strategies import dp
 ROUNDING = 1 + 1e-12
 
 
-@pytest.mark.parametrize("block", range(10))
+@pytest.mark.parametrize(
+    "block", [*range(3), *(pytest.param(n, marks=pytest.mark.long) for n in range(3, 10))]
+)
 def test_every_rung_is_a_bound_and_the_ladder_never_falls(block):
     checked = 0
     for seed in range(1000 + 100 * block, 1100 + 100 * block):
@@ -62,12 +64,6 @@ def gap_percent(problem) -> float:
     rollout = simulate(problem, solve(problem).control)
     bound, _ = certify(problem, rollout).bound_kg(rollout.end_j)
     return 100 * (rollout.cost_kg / bound - 1)
-
-
-@pytest.mark.parametrize("cycle", CYCLES)
-@pytest.mark.parametrize("car", HYBRIDS)
-def test_dp_is_certified_to_0_05_percent(problem_of, car, cycle):
-    assert gap_percent(problem_of(car, cycle)) <= 100 * TARGET_GAP
 
 
 @pytest.mark.parametrize(
