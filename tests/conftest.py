@@ -51,6 +51,34 @@ def driven_of():
     return lambda cycle: _compared(cycle)[1]
 
 
+@pytest.fixture(scope="session")
+def beginnings(tmp_path_factory):
+    """A folder with the shipped cycles, each up to its first standstill after 100 s."""
+    from hevopt.files.lookup import shipped_folder
+
+    made = tmp_path_factory.mktemp("cycles")
+    for path in shipped_folder("cycles").glob("*.csv"):
+        kept = []
+        for line in path.read_text().splitlines(keepends=True):
+            kept.append(line)
+            values = line.split(",")
+            if values[0].isdigit() and float(values[0]) >= 100 and float(values[1]) == 0:
+                break
+        (made / path.name).write_text("".join(kept))
+    return made
+
+
+@pytest.fixture
+def quick(beginnings, monkeypatch):
+    """The shipped cycles are short: what commands do is the same, and they do it soon."""
+    from hevopt.files.lookup import shipped_folder as real
+
+    monkeypatch.setattr(
+        "hevopt.files.lookup.shipped_folder",
+        lambda kind: beginnings if kind == "cycles" else real(kind),
+    )
+
+
 @pytest.fixture
 def hevopt(monkeypatch, capsys, tmp_path):
     """Run the command line in an empty folder."""

@@ -15,7 +15,6 @@ from matplotlib import pyplot
 import hevopt
 from hevopt.bounds import certificate
 from hevopt.cli import main
-from hevopt.files.lookup import shipped_folder
 from hevopt.strategies import dp
 from hevopt.studies.settings import Settings
 
@@ -34,21 +33,6 @@ def blocks(language: str) -> list:
     ]
 
 
-@pytest.fixture(scope="session")
-def beginnings(tmp_path_factory):
-    """A folder with the shipped cycles, each up to its first standstill after 100 s."""
-    made = tmp_path_factory.mktemp("cycles")
-    for path in shipped_folder("cycles").glob("*.csv"):
-        kept = []
-        for line in path.read_text().splitlines(keepends=True):
-            kept.append(line)
-            values = line.split(",")
-            if values[0].isdigit() and float(values[0]) >= 100 and float(values[1]) == 0:
-                break
-        (made / path.name).write_text("".join(kept))
-    return made
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder with the shipped files of a checkout, and a car of the user's own."""
@@ -59,16 +43,6 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text(text.replace('name = "C2"', 'name = "mine"'))
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-@pytest.fixture
-def quick(beginnings, monkeypatch):
-    """The shipped cycles are short: what commands do is the same, and they do it soon."""
-    real = shipped_folder
-    monkeypatch.setattr(
-        "hevopt.files.lookup.shipped_folder",
-        lambda kind: beginnings if kind == "cycles" else real(kind),
-    )
 
 
 @pytest.mark.parametrize("block", blocks("sh"))

@@ -67,7 +67,8 @@ def test_the_attack_would_find_a_tangent_beyond_the_window(monkeypatch):
 
     monkeypatch.setattr(Battery, "within_window", remembered)
     monkeypatch.setattr(step_prices.kernels, "worth_by_tangents", beyond)
-    faults = (fault for n in range(20_000, 20_300) for fault in attack(range(n, n + 1)))
+    # One such problem in a hundred shows it: 20 227 and 20 253 do.
+    faults = (fault for n in range(20_220, 20_260) for fault in attack(range(n, n + 1)))
     assert any("prices is" in fault and "above a plan" in fault for fault in faults)
 
 

@@ -136,7 +136,7 @@ def test_a_closed_pipe_is_not_an_error():
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-", "2>&1 | true"])
-@pytest.mark.parametrize(("words", "status"), [("strategies", 0), ("--help", 0), ("run nope", 2)])
+@pytest.mark.parametrize(("words", "status"), [("cycles", 0), ("--help", 0), ("run nope", 2)])
 def test_closed_streams_change_neither_status_nor_what_the_others_get(closed, words, status):
     program = f"{sys.executable} -c 'from hevopt.cli import main; main()'"
     shell = ["bash", "-c", f"set -o pipefail; {program} {words} {closed}"]

@@ -73,7 +73,7 @@ def test_studies_of_long_drives_say_it_too(command, hevopt, monkeypatch):
     speeds = [min(2 * n, 40, 2 * (80 - n)) for n in range(81)]
     rows = "".join(f"{n},{v}\n" for n, v in enumerate(speeds))
     Path("short.csv").write_text("time_s,speed_kmh\n" + rows)
-    options = ("--points", "2") if command == "pareto" else ("--strategies", "conventional")
-    seen = hevopt(command, "C2", "--cycle", "short.csv", *options)
+    words = ("C2", "--points", "2") if command == "pareto" else ("A", "--strategies", "baseline")
+    seen = hevopt(command, *words, "--cycle", "short.csv")
     assert seen.status == 0
     assert "hevopt: 80 steps will take about" in seen.err

@@ -24,6 +24,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 if __name__ == "__main__":
@@ -87,6 +88,8 @@ def fuzz(
 
 def _load_compiled_parts() -> None:
     """So that the children, which share this process's memory, need not."""
+    for name in ("matplotlib.pyplot", "openpyxl", "hevopt.measured", "hevopt.pages"):
+        import_module(name)
     from hevopt import compare
 
     compare(SHORT_CYCLE, ["A", "C2"], ["conventional", "ecms"], allow_shortfall=True)

@@ -155,18 +155,18 @@ def test_order_of_controls_does_not_matter():
 
 def test_same_bits_with_one_and_two_threads(tmp_path):
     code = (
-        "from hevopt import *; p = build_problem(load_architecture('C2'), load_cycle('hwfet')); "
-        "t = simulate(p, solve(p).control); "
-        "print(t.total_fuel_kg.hex(), t.end_j.hex(), certify(p, t).bound_kg(t.end_j)[0].hex())"
+        "import numba; from hevopt import *; "
+        "p = build_problem(load_architecture('C2'), load_cycle('hwfet')); said = []\n"
+        "for threads in (1, 2):\n"
+        "    numba.set_num_threads(threads); t = simulate(p, solve(p).control)\n"
+        "    said.append((t.total_fuel_kg, t.end_j, certify(p, t).bound_kg(t.end_j)[0], *t.soc))\n"
+        "print(said[0] == said[1])"
     )
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", code], env=os.environ | {"NUMBA_NUM_THREADS": count},
-            capture_output=True, text=True, check=True,
-        ).stdout
-        for count in ("1", "2")
-    ]  # fmt: skip
-    assert said[0] == said[1] and said[0].count("0x") == 3
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"NUMBA_NUM_THREADS": "2"},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.stdout == "True\n", done.stderr
 
 
 def chain(steps=4, **changes):

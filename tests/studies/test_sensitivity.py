@@ -108,7 +108,7 @@ def test_a_comparison_is_shown_and_written_whatever_a_value_does(hevopt):
     assert "C2, vehicle mass 1650: " in Path("page.html").read_text()
 
 
-def test_studies_of_a_refined_comparison_are_refined(hevopt):
+def test_studies_of_a_refined_comparison_are_refined(hevopt, quick):
     words = "compare --architectures B --strategies dp --refine --sensitivity --fronts --save s.gz"
     status, _, err = hevopt(*words.split())
     assert status == 0, err

@@ -77,8 +77,10 @@ def test_what_a_strategy_learns_from_is_in_its_key_and_in_no_other(monkeypatch):
     assert {name for name in before if before[name] != after[name]} == {"sdp"}
 
 
-def test_a_copy_of_a_shipped_cycle_teaches_no_more_than_the_cycle_itself(tmp_path):
-    (tmp_path / "mine.csv").write_bytes((shipped_folder("cycles") / "hwfet.csv").read_bytes())
+def test_a_copy_of_a_shipped_cycle_teaches_no_more_than_the_cycle_itself(
+    tmp_path, quick, beginnings
+):
+    (tmp_path / "mine.csv").write_bytes((beginnings / "hwfet.csv").read_bytes())
     rows = []
     for cycle in ("hwfet", str(tmp_path / "mine.csv")):
         ((job, planned),) = jobs_of("C2", [cycle], ["sdp"], [({}, [(0, 0.0)])])
