@@ -11,6 +11,20 @@ CYCLES = (
     "nedc", "wltc_class3b", "udds", "hwfet", "us06", "ftp75", "cadc_urban", "cadc_road",
     "cadc_motorway130",
 )  # fmt: skip
+# What compiles most comes first, loops of engines and plants beside those of strategies, so that no two workers
+# compile the same; then what takes long, so that short files fill the end.
+FIRST = (
+    "mean_value/", "bounds/test_bounds", "forward/", "studies/test_comparison", "tipin/", "test_docs",
+    "sweeps/workers/", "sweeps/test_sweep_cli", "sweeps/", "pages/", "test_notebooks", "bounds/", "strategies/",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    def place(item):
+        name = item.nodeid.removeprefix("tests/")
+        return next((n for n, start in enumerate(FIRST) if name.startswith(start)), len(FIRST))
+
+    items.sort(key=place)
 
 
 @cache
