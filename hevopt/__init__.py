@@ -31,6 +31,7 @@ _HOME = {
     "simulate": "hevopt.problem.simulation",
     "certify": "hevopt.bounds.certificate",
     "Certificate": "hevopt.bounds.certificate",
+    "write_proof": "hevopt.output.proof_files",
     "compare": "hevopt.studies.comparison",
     "Comparison": "hevopt.studies.comparison",
     "compare_and_report": "hevopt.pages.comparison.compared",

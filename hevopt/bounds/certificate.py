@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -71,6 +72,13 @@ class Claim:
         )
 
 
+class Recursion(NamedTuple):
+    """From what a lower-bound DP can be computed again: nodes of its grid and about what charge is worth."""
+
+    nodes: int
+    price_kgpj: float
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Certificate(Shown):
     """Bounds on cost (kg: fuel, plus weighted NOx) for any end charge, as supporting lines.
@@ -78,6 +86,7 @@ class Certificate(Shown):
     proofs: kind of proof -> its lines; the highest line at an end charge is the bound there
     at_least: kind of proof -> bound for end charges of end_min_j or more, end_slack_j less by rounding
     failures: kind of proof -> why it was tried and not found
+    recursions: kind of proof -> from what its bound in at_least can be computed again
     """
 
     end_min_j: float
@@ -85,6 +94,7 @@ class Certificate(Shown):
     at_least: dict[Proof, float] = field(default_factory=dict)
     failures: dict[Proof, str] = field(default_factory=dict)
     end_slack_j: float = 0.0
+    recursions: dict[Proof, Recursion] = field(default_factory=dict)
 
     def _facts(self) -> dict[str, object]:
         bound_kg, proof = self.bound_kg(self.end_min_j)
@@ -160,7 +170,9 @@ def certify(
             break
         best = certificate.at_least.get(Proof.LOWER_BOUND_DP, -inf)
         bound = lower_bound_kg(problem, worth, nodes=nodes)
-        certificate.at_least[Proof.LOWER_BOUND_DP] = max(best, bound)
+        if bound > best:
+            certificate.at_least[Proof.LOWER_BOUND_DP] = bound
+            certificate.recursions[Proof.LOWER_BOUND_DP] = Recursion(nodes, worth)
         gap = _gap(certificate, rollout)
     return certificate
 

@@ -1,9 +1,12 @@
 """Supporting lines of a dual over the scale of its prices, and its top, found where lines from both sides meet."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from hevopt.display.facts import Shown
+from hevopt.problem.arrays import Array
 
 _LINES_MAX = 200
 _QUADRUPLINGS_MAX = 16
@@ -11,18 +14,22 @@ _QUADRUPLINGS_MAX = 16
 _RELATIVE_TOLERANCE = 1e-13
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Line(Shown):
     """A supporting line of a dual, and a bound for every end charge.
 
     scale, value_kg, slope_kg: where it touches, the bound there less its rounding, its derivative by the scale
     price_kgpj: price at the end, which is what a joule more of end charge adds to the bound
+    rounding_kg: what the bound was lowered by
+    shape: (time,) prices of stored energy after each step, at scale 1
     """
 
     scale: float
     value_kg: float
     slope_kg: float
     price_kgpj: float
+    rounding_kg: float = 0.0
+    shape: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def maximise(

@@ -63,7 +63,7 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
     end = problem.end_min_j - end_slack_j(problem)
     below, above = np.ceil((end - low) / cell), np.ceil((high - end) / cell)
     grid = end + cell * np.arange(-below, max(above, 1.0) + 1)
-    slope = _STEEPNESS * max(price_kgpj, 1e-12)
+    slope = slope_kgpj(price_kgpj)
     terminal = slope * np.maximum(end - grid, 0.0)
     unreachable = _unreachable_kg(choices, terminal)
     relaxation = kernels.Relaxation(slope * cell, unreachable)
@@ -75,6 +75,11 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
     bound = float(np.interp(problem.start_j, grid, value[problem.start_mode]))
     most = abs(unreachable) + slope * 4.0 * (grid[-1] - grid[0])
     return float(bound - 16.0 * EPSILON * choices.steps * most)
+
+
+def slope_kgpj(price_kgpj: float) -> float:
+    """What a joule counts that is missing below the window or at the end, where charge is worth about the price."""
+    return _STEEPNESS * max(price_kgpj, 1e-12)
 
 
 def _parts(choices: Choices) -> Iterator[Choices]:

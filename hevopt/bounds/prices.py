@@ -178,11 +178,14 @@ def dual(problem: Problem, choices: Choices, priced: Priced) -> list[Line]:
     lines = maximise(paths.line, typical_price_kgpj(choices, priced.worth), paths.steepest)
     fallen_kg = 2.0 * float(np.sum(step_maxima(choices, -choices.cost_kg)))
     many = EPSILON * (2 * choices.steps + 48)
+    shape = np.append(priced.before[1:], priced.end_price)
 
     def lowered(line: Line) -> Line:
         own_kg = abs(line.value_kg - line.scale * priced.constant)
-        allowance_kg = many * (own_kg + fallen_kg) + line.scale * priced.rounding_kg
-        return replace(line, value_kg=line.value_kg - allowance_kg - TINY * (line.scale > 0))
+        rounding_kg = many * (own_kg + fallen_kg) + line.scale * priced.rounding_kg
+        rounding_kg += TINY * (line.scale > 0)
+        value_kg = line.value_kg - rounding_kg
+        return replace(line, value_kg=value_kg, rounding_kg=rounding_kg, shape=shape)
 
     return sorted(map(lowered, lines), key=lambda line: line.value_kg)
 

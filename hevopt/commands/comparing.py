@@ -72,16 +72,18 @@ class Files:
     """Where results go, None for nowhere, and what of the solved cases they need.
 
     out: rows; steps: every step of every row; page, save: the report and what it is made from, with fronts and
-    effects (sensitivities) of every car where asked for
+    effects (sensitivities) of every car where asked for; proofs: the folder that every row's bound goes to
     """
 
     out: Path | None
     steps: Path | None
     page: Path | None
     save: Path | None
+    proofs: Path | None
     fronts: bool
     effects: bool
     _collector: "Collector | None" = field(default=None, init=False)
+    _proven: list[tuple[str, Any, Any]] = field(default_factory=list, init=False)
     _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
 
     def check(self, job: Job) -> None:
@@ -91,6 +93,10 @@ class Files:
         from hevopt.files.writing import check_outs
         from hevopt.output.file_tables import check_table_file
 
+        if self.proofs is not None:
+            from hevopt.output.proof_files import check_folder
+
+            check_folder(self.proofs)
         tables = {"--out": self.out, "--out-steps": self.steps}
         check_outs({"--report": self.page, "--save": self.save, **tables}, job.inputs)
         for path in tables.values():
@@ -121,6 +127,9 @@ class Files:
         """Take what the files need of a solved case."""
         if self._collector is not None:
             self._collector.observe(case, row, plan, trajectory)
+        if self.proofs is not None:
+            name = f"{case.cycle.name}_{row.architecture}_{row.strategy}"
+            self._proven.append((name, trajectory, case.certificate))
         if self.steps is not None:
             from hevopt.output.file_tables import step_frame
 
@@ -137,6 +146,13 @@ class Files:
         if self.steps is not None:
             outputs.write_steps(self.steps, comparison, outputs.joined(self._driven), job.about)
             lines.append(f"steps written to {self.steps}")
+        if self.proofs is not None:
+            from hevopt.output.proof_files import write_proofs
+
+            count = write_proofs(self.proofs, self._proven)
+            lines.append(
+                f"{count} proofs written to {self.proofs}; tools/check_proof.py checks them"
+            )
         return lines, failures
 
     def _write_page(

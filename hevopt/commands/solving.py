@@ -50,6 +50,10 @@ def compare(
         Path | None,
         typer.Option("--save", help="Save all results to this file (JSON, gzip), for report."),
     ] = None,
+    proofs: Annotated[
+        Path | None,
+        typer.Option("--proof", help="Write every bound as a proof that others can check, there."),
+    ] = None,
     fronts: Annotated[
         bool, typer.Option("--fronts", help="Add every car's front of fuel and NOx to the page.")
     ] = False,
@@ -72,7 +76,7 @@ def compare(
     asked = study_of(joined(below, given_of(_OPTIONS, options)))
     cars = cars_of(asked.architectures, asked.settings)
     job = Job(cars, load_cycle(asked.cycle), asked.settings, study_path)
-    files = Files(out, steps, page, save, fronts, effects)
+    files = Files(out, steps, page, save, proofs, fronts, effects)
     files.check(job)
     compared = partial(study.compare_cars, cars.cars, settings=asked.settings)
     say_how_long(job.trace, compared)
