@@ -48,7 +48,7 @@ def short(tmp_path_factory):
     drive.write_text(f"time_s,speed_kmh\n{rows}\n")
     problem = build_problem(load_architecture("C2"), load_cycle(drive))
     plan = simulate(problem, solve(problem).control)
-    with mock.patch.object(certificate_module, "LOWER_DP_NODES", (501,)):
+    with mock.patch.object(certificate_module, "LOWER_DP_NODES", (1001,)):
         certificate = certify(problem, plan, target_gap=-1.0)
     by_kind = parts(certificate)
     bounds = {}
