@@ -6,7 +6,8 @@ from which it is computed again), the table's digest, and the plan beside it. `t
 
 The digest is SHA-256 over the arrays by name, in alphabetic order, each as "name dtype shape" and its bytes.
 What is claimed is the certificate's bound less its own rounding allowance twice more, as who checks it rounds as
-well; of the lower-bound DP less what one cell of its grid is worth, and a millionth, as moves are bounded in ways that differ by less.
+well; of the lower-bound DP less what the slope of its relaxation counts for a cell of its grid, and a millionth, as
+moves are bounded there in another way.
 """
 
 import hashlib
@@ -101,7 +102,7 @@ def _recursion(problem: Problem, certificate: Certificate) -> dict[str, Any]:
     return {
         "kind": str(kind),
         "end_j": certificate.end_min_j - certificate.end_slack_j,
-        "bound_kg": bound_kg - price_kgpj * (high - low) / (nodes - 1) - 1e-6 * abs(bound_kg),
+        "bound_kg": bound_kg - slope * (high - low) / (nodes - 1) - 1e-6 * abs(bound_kg),
         "nodes": nodes,
         "slope_kgpj": slope,
     }
