@@ -140,7 +140,7 @@ def _numbers(option: str, text: str | None) -> list[float]:
 
 def _print(study: "TipInStudy") -> None:
     from hevopt.output import tipin_tables as tables
-    from hevopt.tipin.drive import titled
+    from hevopt.tipin.drive import inertia_said, titled
 
     found = study.found
     show(tables.feel_table(found, titled(study.manoeuvre)))
@@ -148,6 +148,8 @@ def _print(study: "TipInStudy") -> None:
     if any(tip_in.assist for tip_in in found):
         show(tables.assist_table(found))
     write(tables.start_text(found[0]))
+    if said := inertia_said(study.manoeuvre):
+        write(said)
     write(tables.notes(found))
     for label, error in study.failed.items():
         write(f"{label}: {error}")

@@ -30,7 +30,7 @@ from hevopt.mean_value._gas_kernels import (
     valve,
 )
 from hevopt.mean_value._turbo_kernels import Compression, Expansion, compressor, turbine
-from hevopt.mean_value.parameters import ASSIST, Ambient, Car, Cooler, Gas, Model
+from hevopt.mean_value.parameters import ASSIST, FULL_LOAD, Ambient, Car, Cooler, Drive, Gas, Model
 
 Vector = NDArray[np.float64]
 
@@ -76,6 +76,17 @@ def _cooled(ahead: State, cooler: Cooler, gas: Gas) -> float:
     return enthalpy(t, ahead.burnt, gas)
 
 
+@compiled(inline="always")
+def _pedal(t: float, y: Vector, drive: Drive) -> float:
+    return min(max(float(y[s.PEDAL]) + drive.pedal_rate_ps * t, 0.0), 1.0)
+
+
+@compiled(inline="always")
+def _clutch(y: Vector, car: Car) -> float:
+    slip = y[s.ENGINE] - car.ratio_radpm * y[s.ROAD]
+    return car.clutch_nm * tanh(slip / car.clutch_slip_radps)
+
+
 @compiled()
 def _assist(y: Vector, brake: float, full: float, pedal: float, model: Model) -> float:
     """Torque of the machine that fills what the engine lacks of its full load, as far as it can."""
@@ -102,15 +113,14 @@ def flows(t: float, y: Vector, model: Model) -> Flows:
     cylinders, valves = engine.cylinders, engine.recirculation
     speed, turbo = max(y[s.ENGINE], 0.0), max(y[s.TURBO], 0.0)
     into = filling(speed, three, four, cylinders)
-    pedal = min(max(y[s.PEDAL] + model.drive.pedal_rate_ps * t, 0.0), 1.0)
+    pedal = _pedal(t, y, model.drive)
     asked = command(
         speed, pedal, into, y[s.METER], y[s.BOOST], three, four,
         model.curves, model.control, cylinders, gas,
     )  # fmt: skip
     burning = combustion(speed, into, asked.fuel, three, four, cylinders)
     brake = pedal * asked.full_load if model.drive.from_map > 0.0 else burning.torque
-    slip = y[s.ENGINE] - model.car.ratio_radpm * y[s.ROAD]
-    clutch = model.car.clutch_nm * tanh(slip / model.car.clutch_slip_radps)
+    clutch = _clutch(y, model.car)
     return Flows(
         one, two, three, four, five, air,
         restriction(air, one, losses.filter_h, losses.linear_below_pa),
@@ -208,8 +218,23 @@ def _car_rates(f: Flows, y: Vector, dy: Vector, model: Model) -> None:
 
 
 @compiled()
+def _map_rates(t: float, y: Vector, dy: Vector, model: Model) -> None:
+    """Equations (31) and (32) by the steady map; the gas rests, as the car asks nothing of it."""
+    for i in range(s.SIZE):
+        dy[i] = 0.0
+    car, clutch = model.car, _clutch(y, model.car)
+    brake = _pedal(t, y, model.drive) * curve(max(y[s.ENGINE], 0.0), FULL_LOAD, model.curves)
+    dy[s.ENGINE] = (brake - clutch) / car.engine_inertia_kgm2
+    dy[s.TYRE] = (clutch * car.ratio_radpm * car.efficiency - y[s.TYRE]) / car.tyre_lag_s
+    dy[s.ROAD] = acceleration(y, car)
+
+
+@compiled()
 def derivative(t: float, y: Vector, model: Model, dy: Vector) -> None:
     """Rates of all states at time t and state y, written to dy."""
+    if model.drive.from_map > 0.0:
+        _map_rates(t, y, dy, model)
+        return
     f = flows(t, y, model)
     _mass_rates(f, dy)
     _energy_rates(f, y, dy, model)

@@ -246,7 +246,7 @@ class Drive(NamedTuple):
     held: 1 keeps engine and road speed as they are, as a dynamometer does
     seek_nm: pedal moves until the engine gives this torque; NaN: it does not
     pedal_rate_ps: pedal moved from time 0 on, up to 1
-    from_map: 1 drives with the torque that a steady map gives at once, pedal times full load
+    from_map: 1 drives with the torque that a steady map gives at once, pedal times full load; the gas rests
     """
 
     held: float = 0.0

@@ -17,6 +17,7 @@ from hevopt.mean_value import states as s
 from hevopt.mean_value.car import car_in_gear, cruise, model_of
 from hevopt.mean_value.parameters import FULL_LOAD, Diesel, Drive, Model, curve_of
 from hevopt.mean_value.paths import paths
+from hevopt.mean_value.rotor import scaled_inertia_kgm2
 from hevopt.mean_value.run import STEP_S, Integrator, Run, simulate
 from hevopt.tipin.assist import Assist, assisted, help_of, helping
 from hevopt.tipin.case import Case, changes_of, varied
@@ -30,7 +31,10 @@ PEDAL_PER_S, DURATION_S = 10.0, 8.0
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TipIn(Shown):
-    """A driven case, and the same car by its steady map. assist: what the machine did, where one helped"""
+    """A driven case, and the same car by its steady map, whose gas rests.
+
+    assist: what the machine did, where one helped
+    """
 
     case: Case
     run: Run
@@ -56,6 +60,18 @@ def titled(manoeuvre: Manoeuvre) -> str:
     """A manoeuvre in a few words."""
     kmh = manoeuvre.speed_mps * KMH_PER_MPS
     return f"{manoeuvre.architecture.name}, full pedal at {kmh:g} km/h in gear {manoeuvre.gear}"
+
+
+def inertia_said(manoeuvre: Manoeuvre) -> str:
+    """What is uncertain of a turbocharger's inertia that the engine's file does not give; '' where it does."""
+    if "inertia_kgm2" in manoeuvre.architecture.contents["engine"]["mean_value"]["rotor"]:
+        return ""
+    engine = manoeuvre.diesel.engine
+    own, low, high = scaled_inertia_kgm2(engine.compressor.wheel_diameter_m)
+    return (
+        f"The file gives no inertia of the turbocharger: {own:.2g} kg m² by its size, {low:.2g} and {high:.2g} by "
+        f"the two known rotors; --turbo-inertia {low / own:.2f},{high / own:.2f} drives with these."
+    )
 
 
 def tip_in(manoeuvre: Manoeuvre, case: Case) -> TipIn:

@@ -104,3 +104,15 @@ def test_another_size_of_the_engine_lags_as_its_rotor_says(hevopt, tmp_path):
     own = hevopt("tipin", "big.toml", "--json")
     one, two = (json.loads(seen.out)["cases"][0]["figures"] for seen in (own, half))
     assert two["accel_mps2"][0] > 1.1 * one["accel_mps2"][0]
+
+
+def test_an_inertia_that_no_file_gives_is_scaled_and_its_uncertainty_said(hevopt, tmp_path):
+    text = (shipped_folder("architectures") / "components" / "engine_diesel_1300.toml").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("inertia_kgm2 = 6.0e-6")]
+    (tmp_path / "unweighed.toml").write_text("\n".join(lines))
+    seen = hevopt("tipin", "--set", 'engine="./unweighed.toml"', "--report", "page.html")
+    assert seen.status == 0, seen.err
+    said = "6.2e-06 kg m² by its size, 5.4e-06 and 7.1e-06 by the two known rotors; --turbo-inertia 0.87,1.15"
+    assert said in " ".join(seen.out.split())
+    assert said in (tmp_path / "page.html").read_text("utf-8")
+    assert "The file gives no inertia" not in hevopt("tipin").out

@@ -40,26 +40,27 @@
         notes.push({ xref: "paper", x: 1.008, xanchor: "left", yref: "paper", y: top - 0.004 - 0.0145 * k, yanchor: "top", showarrow: false, text: plain(name), font: { size: narrow(width) ? 10 : 11, color: look.colours[hue] } });
       });
     });
-    const marks = [["torque_90", "90 % torque"], ["boost_90", "90 % boost"]].filter(([name]) => c[name] !== null && c[name] < LAST_S);
+    const marks = [["torque_90", "90 % torque"], ["boost_90", "90 % boost"]].filter(([name]) => c[name] !== null && c[name] < LAST_S).sort(([a], [b]) => c[a] - c[b]);
     const shapes = marks.map(([name]) => ({ type: "line", x0: c[name], x1: c[name], yref: "paper", y0: 0, y1: 1, line: { color: look.muted, width: 1, dash: "dot" } }));
-    marks.forEach(([name, text], n) => notes.push({ x: c[name], y: 1, yref: "paper", yanchor: "bottom", xanchor: n === 0 && marks.length > 1 && c[marks[1][0]] > c[name] ? "right" : "left", showarrow: false, text: `${text}: ${c[name].toFixed(2)} s`, font: { size: 11, color: look.muted } }));
-    return { data: traces, fresh: true, layout: layout(look, width, { ...own, shapes, annotations: notes, hovermode: "x unified", showlegend: false, margin: { l: 74, r: narrow(width) ? 92 : 124, t: 26, b: 46 },
+    marks.forEach(([name, text], n) => notes.push({ x: c[name], y: 1, yref: "paper", yanchor: "bottom", xanchor: n === 0 && marks.length > 1 ? "right" : "left", showarrow: false, text: `${text}: ${c[name].toFixed(2)} s`, font: { size: 11, color: look.muted } }));
+    return { data: traces, fresh: true, layout: layout(look, width, { ...own, shapes, annotations: notes, hovermode: "x unified", showlegend: false, margin: { l: 74, r: narrow(width) ? 104 : 124, t: 26, b: 46 },
       xaxis: axis(look, "time after the pedal begins to move (s)", { range: [-0.05, LAST_S], anchor: `y${rows.length}`, zeroline: false }) }) };
   }
 
   function overlay(look, width) {
-    const rows = data.groups.length, columns = narrow(width) ? 1 : 2, own = {}, traces = [];
+    const rows = data.groups.length, columns = narrow(width) ? 1 : 2, own = {}, traces = [], titles = [];
     data.groups.forEach((group, r) => [["accel", "acceleration (m/s²)"], ["boost", "boost (bar abs.)"]].forEach(([name, title], k) => {
       const n = 2 * r + k, key = n === 0 ? "" : String(n + 1);
       own[`xaxis${key}`] = axis(look, "time (s)", { anchor: `y${key}`, range: [0, LAST_S], zeroline: false });
       own[`yaxis${key}`] = axis(look, title, { anchor: `x${key}`, nticks: 6, zeroline: false });
+      titles.push({ xref: `x${key} domain`, yref: `y${key} domain`, x: 0.985, y: 0.03, xanchor: "right", yanchor: "bottom", showarrow: false, text: group.title, font: { size: 12, color: look.muted } });
       group.cases.forEach((m, j) => {
         const c = data.cases[m];
-        traces.push(line(c.t, c[name], plain(c.label), j === 0 ? look.ink : of(look, j - 1), { xaxis: `x${key}`, yaxis: `y${key}`, showlegend: k === 0 && (j > 0 || r === 0), legendgroup: c.label, line: { dash: DASHES[j % DASHES.length], width: j === 0 ? 2.2 : 1.6 } }));
+        traces.push(line(c.t, c[name], plain(c.label), j === 0 ? look.ink : of(look, m - 1), { xaxis: `x${key}`, yaxis: `y${key}`, showlegend: k === 0 && (j > 0 || r === 0), legendgroup: c.label, line: { dash: DASHES[m % DASHES.length], width: j === 0 ? 2.2 : 1.6 } }));
       });
     }));
     const cells = rows * (columns === 1 ? 2 : 1);
-    return { height: 60 + 280 * cells, data: traces, layout: layout(look, width, { ...own, grid: { rows: cells, columns, pattern: "independent", xgap: 0.14, ygap: 0.28 }, margin: { l: 62, r: 14, t: 12, b: 48 } }) };
+    return { height: 60 + 280 * cells, data: traces, layout: layout(look, width, { ...own, annotations: titles, grid: { rows: cells, columns, pattern: "independent", xgap: 0.14, ygap: 0.28 }, margin: { l: 62, r: 14, t: 12, b: 48 } }) };
   }
 
   function compressor(look, width) {

@@ -11,7 +11,7 @@ from hevopt.pages.render import render
 from hevopt.pages.tipin.drawing import DRAWN_MAX, drawn
 from hevopt.studies.provenance import digests_shown, files_digests, versions
 from hevopt.tipin.bands import Band
-from hevopt.tipin.drive import Manoeuvre, TipIn, titled
+from hevopt.tipin.drive import Manoeuvre, TipIn, inertia_said, titled
 from hevopt.tipin.figures import DEFINITIONS, TIMES_S
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
@@ -42,6 +42,7 @@ def tipin_page(
         times=TIMES_S,
         definitions=DEFINITIONS,
         start=found[0].figures.start,
+        inertia=inertia_said(manoeuvre),
         rpm=RPM_PER_RADPS,
         kmh=KMH_PER_MPS,
         bands=bands,
