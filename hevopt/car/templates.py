@@ -9,6 +9,9 @@ gearbox_output   P3      the machine on the wheels, through a gear of its own an
 even_shaft               two gearboxes with a clutch each; the machine on the shaft of the even gears
 power_split              engine on the carrier of a planetary set, machine on its sun, machine_2 on its ring and, by
                          the final drive, on the wheels
+series                   machine on the engine's shaft; machine_2, by the final drive, on the wheels
+series_parallel          the same, and a lock-up clutch that joins engine and wheels by a gear of its own
+belt_and_axle    P0+P4   machine on the crankshaft, gearbox and clutch as above; machine_2 on the other axle
 parts                    the parts as the file lists them
 """
 
@@ -23,7 +26,8 @@ from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Planetary
 from hevopt.car.transmission import Gearbox as GearboxData
 
 CouplingKind = Literal[
-    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft", "power_split", "parts"
+    "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft", "belt_and_axle", "power_split",
+    "series", "series_parallel", "parts",
 ]  # fmt: skip
 _CRANK, _INPUT = "crankshaft", "gearbox input"
 
@@ -40,6 +44,10 @@ class Options(NamedTuple):
     planetary_efficiency: float = 1.0
     final_drive_ratio: float = 1.0
     final_drive_efficiency: float = 1.0
+    lock_up_ratio: float = 1.0
+    lock_up_efficiency: float = 1.0
+    axle_ratio: float = 1.0
+    axle_efficiency: float = 1.0
 
 
 def crankshaft(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
@@ -116,6 +124,41 @@ def power_split(kind: str, options: Options) -> Driveline:
     return Driveline(kind, parts, "carrier", placed, free_engine_speed=True)
 
 
+def series(kind: str, options: Options) -> Driveline:
+    """Engine and generator on a shaft of their own, of free speed; the other machine alone drives."""
+    parts = (
+        Gear(
+            "final drive", "motor", WHEEL, options.final_drive_ratio, options.final_drive_efficiency
+        ),
+    )
+    placed = (("machine", _CRANK), ("machine_2", "motor"))
+    return Driveline(kind, parts, _CRANK, placed, free_engine_speed=True)
+
+
+def series_parallel(kind: str, options: Options) -> Driveline:
+    """A series car whose engine's shaft a clutch of the strategy joins to the wheels."""
+    line = series(kind, options)
+    lock_up = (
+        Clutch("lock-up clutch", _CRANK, "lock-up shaft", "strategy"),
+        Gear(
+            "lock-up gear",
+            "lock-up shaft",
+            WHEEL,
+            options.lock_up_ratio,
+            options.lock_up_efficiency,
+        ),
+    )
+    return replace(line, parts=(*line.parts, *lock_up))
+
+
+def belt_and_axle(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
+    """P0+P4: one machine turns with the engine, the other with the axle that the gearbox does not drive."""
+    line = crankshaft(kind, options, gearbox, machine)
+    axle = Gear("rear axle", "rear machine", WHEEL, options.axle_ratio, options.axle_efficiency)
+    placed = (*line.machines, ("machine_2", "rear machine"))
+    return replace(line, parts=(*line.parts, axle), machines=placed)
+
+
 TEMPLATES: dict[str, Callable[[str, Options, GearboxData, Machine], Driveline]] = {
     "none": crankshaft,
     "belt": crankshaft,
@@ -123,11 +166,17 @@ TEMPLATES: dict[str, Callable[[str, Options, GearboxData, Machine], Driveline]] 
     "gearbox_input": gearbox_input,
     "gearbox_output": gearbox_output,
     "even_shaft": even_shaft,
+    "belt_and_axle": belt_and_axle,
 }
-WITHOUT_GEARBOX: dict[str, Callable[[str, Options], Driveline]] = {"power_split": power_split}
+WITHOUT_GEARBOX: dict[str, Callable[[str, Options], Driveline]] = {
+    "power_split": power_split,
+    "series": series,
+    "series_parallel": series_parallel,
+}
 # The components that a kind has beside car and battery; those of "parts" follow from its shafts.
 COMPONENTS_OF: dict[str, frozenset[str]] = {
     **dict.fromkeys(TEMPLATES, frozenset({"engine", "gearbox", "machine"})),
+    "belt_and_axle": frozenset({"engine", "gearbox", "machine", "machine_2"}),
     **dict.fromkeys(WITHOUT_GEARBOX, frozenset({"engine", "machine", "machine_2"})),
 }
 

@@ -21,6 +21,7 @@ from hevopt.car.parts import (
     Gearbox,
     Joint,
     OneWayClutch,
+    Part,
 )
 from hevopt.errors import DataError
 
@@ -80,9 +81,15 @@ def way(driveline: Driveline, state: State, phase: Phase) -> Way:
         shafts = tuple(shaft for shaft in shafts if shaft not in rest)
         joints = tuple(_joint(use, _any_gear(use)) for use in uses)
         held = {shaft: how for shaft, how in held.items() if shaft not in rest}
+    free, follows = "free" in held.values(), driveline.follows_load
     balance = _Balance(driveline, shafts, joints, active, standing=phase.standing)
-    chosen, slack = balance.choices("free" in held.values(), follows=driveline.follows_load)
-    if len(chosen) + ("free" in held.values()) > CHOICES_MAX:
+    chosen, slack = balance.choices(free, follows=follows)
+    while phase.standing and len(chosen) + free > CHOICES_MAX:
+        # At standstill machines may push against each other and the brakes: the last of them does not.
+        del active[[name for name in active if name != ENGINE][-1]]
+        balance = _Balance(driveline, shafts, joints, active, standing=phase.standing)
+        chosen, slack = balance.choices(free, follows=follows)
+    if len(chosen) + free > CHOICES_MAX:
         raise DataError(
             f"driveline: with {_words(state)}, {len(chosen) + 1} quantities are free (speed of the engine; torques "
             f"of {', '.join(chosen)}); allowed: {CHOICES_MAX}; join shafts by gears or clutches, or leave a "
@@ -138,14 +145,18 @@ def _turning(driveline: Driveline, uses: Iterable[Use], state: State) -> set[str
     return turning
 
 
-def _joined(uses: Iterable[Use], shaft: str) -> set[str]:
+def joined(parts: Iterable[Part], shaft: str) -> set[str]:
     """A shaft and all that parts join it to."""
-    joined, groups, grown = {shaft}, [set(use.part.shafts) for use in uses], True
+    found, groups, grown = {shaft}, [set(part.shafts) for part in parts], True
     while grown:
-        reached = [group for group in groups if group & joined and not group <= joined]
+        reached = [group for group in groups if group & found and not group <= found]
         grown = bool(reached)
-        joined |= {other for group in reached for other in group}
-    return joined
+        found |= {other for group in reached for other in group}
+    return found
+
+
+def _joined(uses: Iterable[Use], shaft: str) -> set[str]:
+    return joined((use.part for use in uses), shaft)
 
 
 def _held(

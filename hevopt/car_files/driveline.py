@@ -53,20 +53,24 @@ class PartFile(FileModel):
         return self
 
 
-_SPLIT = {"planetary_ratio", "final_drive_ratio"}
-_LOSSES = {"planetary_efficiency", "final_drive_efficiency"}
 _KEYS_OF_KIND = KeysOfKind(
     {kind: set() for kind in get_args(CouplingKind)}
     | {
         "gearbox_input": {"second_clutch"},
         "gearbox_output": {"machine_ratio", "machine_efficiency"},
-        "power_split": _SPLIT,
+        "power_split": {"planetary_ratio", "final_drive_ratio"},
+        "series": {"final_drive_ratio"},
+        "series_parallel": {"final_drive_ratio", "lock_up_ratio"},
+        "belt_and_axle": {"axle_ratio"},
         "parts": {"parts"},
     },
     {
         "gearbox_output": {"disconnects_above_speed_max"},
         "even_shaft": {"machine_shift_fuel_g"},
-        "power_split": _LOSSES,
+        "power_split": {"planetary_efficiency", "final_drive_efficiency"},
+        "series": {"final_drive_efficiency"},
+        "series_parallel": {"final_drive_efficiency", "lock_up_efficiency"},
+        "belt_and_axle": {"axle_efficiency"},
         "parts": {"engine_shaft", "machine_shaft", "machine_2_shaft", "machine_3_shaft"},
     },
 )
@@ -87,6 +91,10 @@ class CouplingFile(FileModel):
     planetary_efficiency: Fraction = 1.0
     final_drive_ratio: Ratio | None = None
     final_drive_efficiency: Fraction = 1.0
+    lock_up_ratio: Ratio | None = None
+    lock_up_efficiency: Fraction = 1.0
+    axle_ratio: Ratio | None = None
+    axle_efficiency: Fraction = 1.0
     engine_shaft: Name | None = None
     machine_shaft: Name | None = None
     machine_2_shaft: Name | None = None

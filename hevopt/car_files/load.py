@@ -173,6 +173,10 @@ def _options(data: CouplingFile) -> Options:
         data.planetary_efficiency,
         data.final_drive_ratio or 1.0,
         data.final_drive_efficiency,
+        data.lock_up_ratio or 1.0,
+        data.lock_up_efficiency,
+        data.axle_ratio or 1.0,
+        data.axle_efficiency,
     )
 
 

@@ -28,7 +28,9 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
     "CouplingFile": {
         "kind": ("", "where the machine sits: none (alternator), belt (on the engine), crankshaft, gearbox "
                  "input, gearbox output, the even shaft of a dual clutch gearbox; or power_split (machine on the "
-                 "sun, machine_2 on the ring, engine on the carrier); or parts, listed one by one"),
+                 "sun, machine_2 on the ring, engine on the carrier), series (machine on the engine's shaft, "
+                 "machine_2 drives), series_parallel (and a lock-up clutch), belt_and_axle (machine on the "
+                 "engine, machine_2 on the other axle); or parts, listed one by one"),
         "second_clutch": ("", "a clutch between engine and machine, so that electric driving does not drag "
                           "the engine; kind gearbox_input only"),
         "machine_ratio": ("-", "machine speed over gearbox output speed; kind gearbox_output only"),
@@ -38,8 +40,14 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "machine_shift_fuel_g": ("g", "fuel that a change of the machine's gear counts; kind even_shaft only"),
         "planetary_ratio": ("-", "teeth of the ring over teeth of the sun; kind power_split"),
         "planetary_efficiency": ("-", "efficiency of the rolling power; kind power_split"),
-        "final_drive_ratio": ("-", "speed of the ring over that of the wheels; kind power_split"),
-        "final_drive_efficiency": ("-", "efficiency of the final drive; kind power_split"),
+        "final_drive_ratio": ("-", "speed of machine_2 over that of the wheels; kinds power_split, series and "
+                              "series_parallel"),
+        "final_drive_efficiency": ("-", "efficiency of the final drive; the same kinds"),
+        "lock_up_ratio": ("-", "speed of the engine over that of the wheels, lock-up clutch closed; kind "
+                          "series_parallel"),
+        "lock_up_efficiency": ("-", "efficiency of that gear; kind series_parallel"),
+        "axle_ratio": ("-", "speed of machine_2 over that of its wheels; kind belt_and_axle"),
+        "axle_efficiency": ("-", "efficiency of that axle; kind belt_and_axle"),
         "engine_shaft": ("", "name of the shaft that the engine turns; kind parts only"),
         "machine_shaft": ("", "name of the shaft of the machine; kind parts only"),
         "machine_2_shaft": ("", "the same of machine_2"),

@@ -1,7 +1,10 @@
 """A driveline from the parts that an architecture's file lists, each state of it tried."""
 
+from collections.abc import Mapping
+
 from hevopt.car.driveline import Driveline, Phase
 from hevopt.car.parts import (
+    WHEEL,
     Clutch,
     Gear,
     Gearbox,
@@ -11,7 +14,7 @@ from hevopt.car.parts import (
     ShaftBrake,
 )
 from hevopt.car.transmission import Gearbox as GearboxData
-from hevopt.car.ways import way
+from hevopt.car.ways import joined, way
 from hevopt.car_files.driveline import CouplingFile, PartFile
 from hevopt.errors import DataError
 from hevopt.units import TO_SI
@@ -28,10 +31,24 @@ def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
     driven = any(isinstance(part, Clutch) and part.operation == "driver" for part in parts)
     engine = shafts.get("engine")
     line = Driveline("parts", parts, engine, machines, engine is not None and not driven)
+    _check_joined(parts, shafts)
     for state in line.states():
         for phase in _phases(line):
             way(line, state, phase)
     return line
+
+
+def _check_joined(parts: tuple[Part, ...], placed: Mapping[str, str]) -> None:
+    """DataError for an engine or a machine that turns neither the wheels nor another of them."""
+    for name, shaft in placed.items():
+        ends = {WHEEL, *(other for key, other in placed.items() if key != name)}
+        if not joined(parts, shaft) & ends:
+            raise DataError(
+                f"driveline: no part joins {name} on {shaft!r} to the wheels or to another of "
+                f"{', '.join(placed)}; add one, or correct a shaft's name"
+            )
+    if WHEEL not in {shaft for part in parts for shaft in part.shafts}:
+        raise DataError(f"driveline: no part ends at {WHEEL!r}, the wheels; add a final drive")
 
 
 def _phases(line: Driveline) -> list[Phase]:

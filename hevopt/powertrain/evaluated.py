@@ -60,7 +60,8 @@ def battery_idle(
         with np.errstate(invalid="ignore", divide="ignore"):
             middle = np.where(fb != fa, b - fb * (b - a) / (fb - fa), b)
         middle = np.where(np.isfinite(middle), middle, b)
-        fm = flowing(here, completed(here, {**rest, name: middle})).machines_w + load_w
+        drawn_w = flowing(here, completed(here, {**rest, name: middle})).machines_w + load_w
+        fm = np.broadcast_to(drawn_w, middle.shape)
         if np.max(np.abs(fm), where=found[:, None], initial=0.0) < _ROUNDING_W:
             break
         other = fm * fb < 0

@@ -63,6 +63,8 @@ def stretches(car: Architecture, driver: Driver, state: State) -> list[Stretch]:
         for opened, part in _opened(car, driver, state, phase, step):
             if len(part):
                 found = way(car.driveline, state, phase._replace(opened=opened))
+                if found.tied and not state.engine_on and car.driveline.engine in found.shafts:
+                    continue  # an engine that the wheels turn is not at rest
                 key = (found.uses, tuple(found.held.items()), found.chosen, found.slack)
                 merged.setdefault(key, (found, []))[1].append(part)
     result = []
