@@ -1,4 +1,4 @@
-"""Loops compile whatever the disk holds, and give the same bits however they came about."""
+"""Loops compile whatever the disk holds; that they give the same bits is shown in test_uncompiled.py."""
 
 import importlib.util
 import os
@@ -6,18 +6,10 @@ import pickle
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 from numba.core.caching import CacheImpl
-from problems import random_problem
 
-from hevopt import simulate
 from hevopt._compile import compiled
-from hevopt.bounds.lower_dp import lower_bound_kg
-from hevopt.bounds.prices import one_price_dual
-from hevopt.bounds.step_prices import costate_dual
-from hevopt.problem.choices import choices_of
-from hevopt.strategies import _backward_kernels, _rollout_kernels, dp
 
 TWICE = """
 from hevopt._compile import compiled
@@ -120,40 +112,6 @@ def test_without_a_place_for_the_cache_a_loop_is_compiled_all_the_same(monkeypat
         return 2 * x
 
     assert twice(21) == 42
-
-
-def figures() -> str:
-    """Every bit of what the loops find on small problems: costs, paths and bounds."""
-    found = []
-    for seed in (4, 5, 7):
-        problem = random_problem(seed)
-        rollout = simulate(problem, dp.solve(problem, nodes=41).control)
-        worth = one_price_dual(problem)[-1]
-        bounds = [
-            worth.value_kg,
-            costate_dual(problem, rollout)[-1].value_kg,
-            lower_bound_kg(problem, worth.price_kgpj, nodes=101),
-        ]
-        choices, low_high = choices_of(problem), np.array(problem.window_j)
-        terminal = np.tile(np.linspace(1e-3, 0.0, 31), (choices.modes, 1))
-        grid = _rollout_kernels.Grid(np.full(choices.steps + 1, low_high[0]), np.ptp(low_high) / 30)
-        penalty = _backward_kernels.Penalty(1e-4, 0.0, 1.0)
-        value = _backward_kernels.backward(
-            choices, terminal, grid, grid.low_j[:-1], penalty, problem.battery.arrays
-        )
-        found += [rollout.cost_kg, rollout.end_j, *bounds, *value[0].flat]
-    return " ".join(float(figure).hex() for figure in found)
-
-
-def test_compiled_loops_compute_what_their_text_says_to_the_last_bit():
-    """So it cannot matter whether a loop was compiled just now, or which of those it calls came from the disk."""
-    code = "from test_compile import figures; print(figures())"
-    plain = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
-        check=True, capture_output=True, text=True,
-    )  # fmt: skip
-    assert figures().split() == plain.stdout.split()
 
 
 SUMS = """
