@@ -148,7 +148,6 @@ def _switch_back(
                 _shift(value[m], least[n], kg, 0, nodes, down, 0.0, penalty)
 
 
-@compiled()
 def backward(
     choices: Choices,
     terminal: Array,
@@ -161,17 +160,33 @@ def backward(
 
     terminal: (mode, node) cost-to-go after the last step
     between_j: (time,) bottom of the grid between switching and step; that of `grid` where switching takes none
+    """
+    # NumPy asks for large pages of memory, compiled loops do not; small ones would take a third of the time.
+    value = np.empty((choices.steps + 1, *terminal.shape))
+    value[-1] = terminal
+    _fill_back(choices, value, grid, between_j, penalty, battery)
+    return value
+
+
+@compiled()
+def _fill_back(
+    choices: Choices,
+    value: Array,
+    grid: Grid,
+    between_j: Array,
+    penalty: Penalty,
+    battery: BatteryArrays,
+) -> None:
+    """Fill the cost-to-go (time + 1, mode, node) back from its last row.
+
     A choice moves every node by nearly the same energy; between the points of the battery's curves the move
     is taken as linear in the node, so that the inner loop runs over contiguous memory. Switching is added
     once per mode, after the minimum over the mode's choices; the energy it takes shifts all nodes alike.
     """
     first, grid_low, cell = choices.first, grid.low_j, grid.cell_j
-    steps, modes = first.shape[0], first.shape[1] - 1
-    nodes = terminal.shape[1]
-    value = np.empty((steps + 1, modes, nodes))
+    steps, modes, nodes = first.shape[0], value.shape[1], value.shape[2]
     least = np.empty((modes, nodes))
     efficiency = battery.coulombic_efficiency
-    value[steps] = terminal
     for k in range(steps - 1, -1, -1):
         breaks, states = _bends(between_j[k], cell, nodes, battery)
         drift = (between_j[k] - grid_low[k + 1]) / cell
@@ -197,4 +212,3 @@ def backward(
                     )  # fmt: skip
         apart = (grid_low[k] - between_j[k]) / cell
         _switch_back(value[k], least, choices.switching, k, apart, cell, penalty)
-    return value
