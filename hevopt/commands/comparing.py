@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hevopt.commands.reporting import command_line
-from hevopt.commands.terminal import Progress, show, write
+from hevopt.commands.terminal import Progress, show, show_notes, width, write
 from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
@@ -175,7 +175,19 @@ class Files:
         return write_files(results, self.page, self.save), failures
 
 
-def show_comparison(job: Job, comparison: "Comparison", *, json: bool) -> None:
+def show_rows(job: Job, comparison: "Comparison", *, wide: bool) -> None:
+    """Print the rows as a table with notes; wide: all columns, however narrow the terminal."""
+    from hevopt.output import terminal_tables as report
+
+    columns = None if wide else width()
+    rows = report.comparison_table(comparison, columns)
+    show(rows)
+    left = report.left_out(rows)
+    notes = [f"left out for want of width: {', '.join(left)}; --wide shows them."] if left else []
+    show_notes("\n".join([*notes, report.comparison_notes(comparison), *job.cars.said()]))
+
+
+def show_comparison(job: Job, comparison: "Comparison", *, json: bool, wide: bool) -> None:
     """Print the rows as a table with notes and published figures, or as JSON."""
     from hevopt.output import file_tables as outputs
     from hevopt.output import terminal_tables as report
@@ -183,8 +195,8 @@ def show_comparison(job: Job, comparison: "Comparison", *, json: bool) -> None:
     if json:
         write(outputs.result_json(comparison, job.about))
         return
-    show(report.comparison_table(comparison))
-    write("\n".join([report.comparison_notes(comparison), *job.cars.said()]) + "\n")
+    show_rows(job, comparison, wide=wide)
+    write("")
     published = report.published_table(comparison) if job.is_study else None
     if published is not None:
         show(published)

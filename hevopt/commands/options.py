@@ -14,6 +14,9 @@ _CYCLE = typer.Option("--cycle", help="Name or CSV file of a cycle.")
 CycleOption = Annotated[str, _CYCLE]
 CycleGivenOption = Annotated[str | None, _CYCLE]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead.")]
+WideOption = Annotated[
+    bool, typer.Option("--wide", help="Show all columns, however narrow the terminal.")
+]
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
 
 

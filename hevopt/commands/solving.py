@@ -12,6 +12,7 @@ from hevopt.commands.options import (
     CycleGivenOption,
     CycleOption,
     JsonOption,
+    WideOption,
     takes_settings,
 )
 from hevopt.commands.terminal import Progress, listed, show, write
@@ -33,6 +34,7 @@ def compare(
         str | None, typer.Option("--architectures", help="Names or files, separated by commas.")
     ] = None,
     json: JsonOption = False,
+    wide: WideOption = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Write the rows to this .csv, .parquet or .json.")
     ] = None,
@@ -83,7 +85,7 @@ def compare(
     with Progress() as progress:
         comparison = compared(job.trace, watch=study.Watch(progress, files.observe))
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
-    show_comparison(job, comparison, json=json)
+    show_comparison(job, comparison, json=json, wide=wide)
     lines, of_files = files.write(job, comparison)
     for line in () if json else lines:
         write(line)
@@ -108,9 +110,10 @@ def run(
         ),
     ] = None,
     json: JsonOption = False,
+    wide: WideOption = False,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
-    from hevopt.commands.comparing import Job
+    from hevopt.commands.comparing import Job, show_rows
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
@@ -152,8 +155,7 @@ def run(
     if json:
         write(outputs.result_json(comparison, job.about))
         return
-    show(report.comparison_table(comparison))
-    write("\n".join([report.comparison_notes(comparison), *job.cars.said()]))
+    show_rows(job, comparison, wide=wide)
     calibration = report.calibration_table(plan)
     if calibration is not None:
         show(calibration)

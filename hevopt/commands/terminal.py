@@ -1,6 +1,8 @@
 """What all commands share: printing, progress, checks of what a user names."""
 
+import os
 import sys
+from textwrap import wrap
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,13 @@ def listed(text: str | None) -> list[str] | None:
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
+def width() -> int | None:
+    """Columns of the terminal, or those that COLUMNS asks for; None where the output goes elsewhere."""
+    from rich.console import Console
+
+    return Console().width if sys.stdout.isatty() or os.environ.get("COLUMNS") else None
+
+
 def show(table: "Table") -> None:
     """Print a table; a terminal narrower than its numbers wraps lines rather than losing digits."""
     from rich.console import Console
@@ -26,7 +35,17 @@ def show(table: "Table") -> None:
     console = Console(highlight=False, width=max(Console().width, needed))
     with console.capture() as capture:
         console.print(table)
-    write(capture.get().removesuffix("\n"))
+    text = capture.get().removesuffix("\n")
+    write(text if sys.stdout.isatty() else "\n".join(map(str.rstrip, text.split("\n"))))
+
+
+def show_notes(text: str) -> None:
+    """Print lines, each wrapped between words where a terminal is narrower."""
+    columns = width()
+    lines = text.split("\n")
+    if columns is not None:
+        lines = [part for line in lines for part in wrap(line, max(columns, 40)) or [""]]
+    write("\n".join(lines))
 
 
 def write(text: str) -> None:

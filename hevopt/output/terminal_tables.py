@@ -1,9 +1,10 @@
-"""Tables for the terminal, the page of strategies, control tables as .npz."""
+"""Tables for the terminal: a comparison, the published figures beside it, the calibration of a rule."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -14,10 +15,93 @@ from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row, end_asked_text, marked, no_reference_text
 
 _CAUSAL_MARK = "†"
+_WIDEST = 400
 
 
-def comparison_table(comparison: Comparison) -> Table:
-    """The rows as a table for the terminal."""
+class _Column(NamedTuple):
+    """A column of a comparison: head, what a row says in it, and when it leaves a narrow terminal, 0 never.
+
+    of: what goes before the head where that alone does not tell the column
+    """
+
+    head: str
+    cell: Callable[[Row], str]
+    leaves: int
+    justify: Literal["left", "right"] = "right"
+    of: str = ""
+
+
+def _number(name: str, form: str) -> Callable[[Row], str]:
+    def cell(row: Row) -> str:
+        value = getattr(row, name)
+        return "-" if value is None else format(0.0 if abs(value) < 5e-7 else value, form)
+
+    return cell
+
+
+def _charge(row: Row) -> str:
+    if row.soc_end is None or row.soc_start is None:
+        return "-"
+    change = row.soc_end - row.soc_start
+    return format(0.0 if abs(change) < 5e-7 else change, "+.4f")
+
+
+# The higher, the sooner it leaves.
+_COLUMNS = (
+    _Column("fuel\nl/100km", _number("fuel_l_per_100km", ".3f"), 0),
+    _Column("vs ref\n%", _number("delta_fuel_percent", "+.1f"), 1),
+    _Column("CO2\ng/km", _number("co2_g_per_km", ".1f"), 8),
+    _Column("NOx\nmg/km", _number("nox_mg_per_km", ".0f"), 5),
+    _Column("vs ref\n%", _number("delta_nox_percent", "+.1f"), 9, of="NOx "),
+    _Column("ΔSOC", _charge, 7),
+    _Column("ΔE/fuel\n%", _number("delta_energy_percent", "+.2f"), 4),
+    _Column("corrected\nl/100km", _number("fuel_corrected_l_per_100km", ".3f"), 3),
+    _Column("starts", lambda row: "-" if row.engine_starts is None else str(row.engine_starts), 6),
+    _Column("bound\nl/100km", _number("bound_l_per_100km", ".3f"), 2),
+    _Column("gap\n%", _number("gap_percent", ".3f"), 0),
+    _Column(
+        "proof",
+        lambda row: "-" if row.certificate is None else str(row.certificate.proof),
+        10,
+        "left",
+    ),
+    _Column("s", _number("solve_s", ".2f"), 11),
+)
+
+
+def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
+    """The rows as a table for the terminal.
+
+    Columns that decide less leave until it is no wider than `width`, and of a failure there is one word, as its
+    message is printed apart.
+    """
+    columns = list(_COLUMNS)
+    if width is None or _width(_table(comparison, columns)) <= width:
+        return _table(comparison, columns)
+    leaving = sorted(columns, key=lambda column: column.leaves)
+    while leaving[-1].leaves and _width(_table(comparison, columns, brief=True)) > width:
+        columns.remove(leaving.pop())
+    return _table(comparison, columns, brief=True)
+
+
+def left_out(table: Table) -> list[str]:
+    """Heads of the columns that have left a comparison's table."""
+    shown = [str(column.header) for column in table.columns]
+    names = []
+    for column in _COLUMNS:
+        if column.head in shown:
+            shown.remove(column.head)
+        else:
+            names.append(column.of + column.head.partition("\n")[0])
+    return names
+
+
+def _width(table: Table) -> int:
+    """What a table needs so that nothing in it goes on in the next line."""
+    return Console(width=_WIDEST).measure(table).maximum
+
+
+def _table(comparison: Comparison, columns: Sequence[_Column], *, brief: bool = False) -> Table:
     table = Table(
         box=box.SIMPLE_HEAD,
         title=Text(f"cycle {comparison.cycle}", style="table.title"),
@@ -27,49 +111,24 @@ def comparison_table(comparison: Comparison) -> Table:
     )
     for name in ("car", "strategy"):
         table.add_column(name, no_wrap=True)
-    for head in (
-        "fuel\nl/100km", "vs ref\n%", "CO2\ng/km", "NOx\nmg/km", "vs ref\n%", "ΔSOC", "ΔE/fuel\n%",
-        "corrected\nl/100km", "starts", "bound\nl/100km", "gap\n%",
-    ):  # fmt: skip
-        table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("proof", no_wrap=True)
-    table.add_column("s", justify="right", no_wrap=True)
-    table.add_column("status")
+    for column in columns:
+        table.add_column(column.head, justify=column.justify, no_wrap=True)
+    table.add_column("status", no_wrap=True)
+    ok = [row for row in comparison.rows if row.status.ok and row.fuel_corrected_l_per_100km]
+    best = min(ok, key=lambda row: row.fuel_corrected_l_per_100km or 0.0, default=None)
     previous = None
     for row in comparison.rows:
         if previous not in (None, row.architecture):
             table.add_section()
         previous = row.architecture
+        mark = _CAUSAL_MARK if row.strategy in comparison.causal else ""
+        cells = [row.architecture, row.strategy + mark, *(column.cell(row) for column in columns)]
+        style = "bold green" if row is best and len(comparison.rows) > 1 else ""
+        told = "failed" if brief and row.status.failure else str(row.status)
+        status = Text(told, style="" if row.status.ok else "yellow")
         # Text, because a name such as "[red]" would be markup in a string.
-        table.add_row(*map(Text, _cells(row, comparison.causal)))
+        table.add_row(*map(Text, cells), status, style=style)
     return table
-
-
-def _cells(row: Row, causal: frozenset[str]) -> list[str]:
-    def number(value: float | None, form: str) -> str:
-        return "-" if value is None else format(0.0 if abs(value) < 5e-7 else value, form)
-
-    change = None
-    if row.soc_end is not None and row.soc_start is not None:
-        change = row.soc_end - row.soc_start
-    return [
-        row.architecture,
-        row.strategy + (_CAUSAL_MARK if row.strategy in causal else ""),
-        number(row.fuel_l_per_100km, ".3f"),
-        number(row.delta_fuel_percent, "+.1f"),
-        number(row.co2_g_per_km, ".1f"),
-        number(row.nox_mg_per_km, ".0f"),
-        number(row.delta_nox_percent, "+.1f"),
-        number(change, "+.4f"),
-        number(row.delta_energy_percent, "+.2f"),
-        number(row.fuel_corrected_l_per_100km, ".3f"),
-        "-" if row.engine_starts is None else str(row.engine_starts),
-        number(row.bound_l_per_100km, ".3f"),
-        number(row.gap_percent, ".3f"),
-        "-" if row.certificate is None else str(row.certificate.proof),
-        number(row.solve_s, ".2f"),
-        str(row.status),
-    ]
 
 
 def comparison_notes(comparison: Comparison) -> str:
@@ -77,6 +136,9 @@ def comparison_notes(comparison: Comparison) -> str:
     objective = "fuel"
     if comparison.nox_weight:
         objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
+    gears = "as the cycle gives them, or by the car's own shift speeds"
+    if comparison.free_gear:
+        gears = "chosen with the plan"
     return (
         f"vs ref: against {_reference(comparison)}. corrected: fuel less what the end charge is worth "
         "(multiplier of the dual).\n"
@@ -85,7 +147,8 @@ def comparison_notes(comparison: Comparison) -> str:
         "gap: how far the row is above it.\n"
         f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
-        "lower-bound DP = a cost-to-go nowhere above the true one."
+        "lower-bound DP = a cost-to-go nowhere above the true one.\n"
+        f"The engine is warm from start to end; gears: {gears}."
         f"{_nox_note(comparison)}"
         f"{_lost_note(comparison)}"
     )
