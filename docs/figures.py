@@ -31,10 +31,14 @@ def _problem(**changes: object) -> Problem:
 def _rest_of(problem: Problem, step: int, soc: float, mode: int) -> Problem:
     """What is left of a problem from a step on."""
     table = problem.table
+
+    def later(matrix: np.ndarray) -> np.ndarray:
+        return matrix if matrix.ndim == 2 else matrix[step:]
+
     kept = ControlTable.from_arrays(
         table.fuel_kg[step:], table.battery_power_w[step:], table.feasible[step:], step_s=table.step_s[step:],
-        mode=table.mode, switch_fuel_kg=table.switch_fuel_kg, switch_allowed=table.switch_allowed,
-        switch_energy_j=table.switch_energy_j,
+        mode=table.mode, switch_fuel_kg=later(table.switch_fuel_kg),
+        switch_allowed=later(table.switch_allowed), switch_energy_j=later(table.switch_energy_j),
     )  # fmt: skip
     return Problem(kept, problem.battery, soc, problem.soc_end_min, start_mode=mode)
 

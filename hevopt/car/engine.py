@@ -19,6 +19,8 @@ from hevopt.car.engine_laws import EngineLaw
 from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
+# Least that the best efficiency counts: what is divided by it stays finite.
+_EFFICIENCY_MIN = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -96,6 +98,14 @@ class Engine(Shown):
             full_load_torque_nm=factor * self.full_load_torque_nm,
             law=self.law.scaled(factor),
         )
+
+    @property
+    def best_efficiency(self) -> float:
+        """The highest efficiency of all speeds and torques."""
+        speed, torque = _best_line(self)
+        fuel_w = self.heating_value_jpkg * self.fuel_kgps(torque, speed)
+        efficiency = torque * speed / np.where(fuel_w > 0, fuel_w, np.inf)
+        return max(float(np.nanmax(efficiency)), _EFFICIENCY_MIN)
 
 
 @lru_cache(maxsize=64)

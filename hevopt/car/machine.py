@@ -38,6 +38,8 @@ class Machine(Shown):
     """A machine: its limits and the law of its loss.
 
     full_load: what holds beside the limits of torque and power; None for these alone.
+    spin_efficiency: of what passes between the battery's store and a shaft whose speed the machine changes at a
+    start, a stop or a change of gear
     """
 
     name: str
@@ -47,6 +49,7 @@ class Machine(Shown):
     inertia_kgm2: float
     loss: LossLaw
     full_load: TorqueCurve | None = None
+    spin_efficiency: float = 0.85
 
     def limit_nm(self, speed_radps: Array) -> Array:
         """Largest torque of either sign at a speed, by torque, by power and by the full-load curve."""
@@ -68,7 +71,7 @@ class Machine(Shown):
             return self.loss.loss_w(np.where(backwards, -torque_nm, torque_nm), np.abs(speed_radps))
         return self.loss.loss_w(torque_nm, speed_radps)
 
-    def generating_nm(self, electric_power_w: float, speed_radps: Array) -> Array:
+    def generating_nm(self, electric_power_w: float | Array, speed_radps: Array) -> Array:
         """Torque, against the speed, that generates an electric power >= 0; NaN where that is too much.
 
         Of several such torques, the one closest to zero.

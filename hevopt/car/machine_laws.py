@@ -23,7 +23,7 @@ class LossLaw(Protocol):
     def loss_w(self, torque_nm: Array, speed_radps: Array) -> Array:
         """Loss, never negative; NaN outside a measured map."""
 
-    def generating_nm(self, electric_power_w: float, speed_radps: Array) -> Array:
+    def generating_nm(self, electric_power_w: float | Array, speed_radps: Array) -> Array:
         """Torque (negative) that generates an electric power >= 0; NaN where that is too much.
 
         Of several such torques, the one closest to zero.
@@ -46,7 +46,7 @@ class LossByEfficiency:
             power > 0, power * (1 / self.efficiency - 1), -power * (1 - self.efficiency)
         )
 
-    def generating_nm(self, electric_power_w: float, speed_radps: Array) -> Array:
+    def generating_nm(self, electric_power_w: float | Array, speed_radps: Array) -> Array:
         """The torque of the electric power over the efficiency."""
         return -electric_power_w / self.efficiency / np.maximum(speed_radps, 1e-9)
 
@@ -70,7 +70,7 @@ class LossByCoefficients:
         loss = self.c0 + self.c1 * speed_radps + self.c2 * speed_radps**2 + self.c3 * torque_nm**2
         return np.where(turning, loss, 0.0)
 
-    def generating_nm(self, electric_power_w: float, speed_radps: Array) -> Array:
+    def generating_nm(self, electric_power_w: float | Array, speed_radps: Array) -> Array:
         """The root of the quadratic that is closer to zero."""
         speed = np.maximum(speed_radps, 1e-9)
         constant = electric_power_w + self.c0 + self.c1 * speed + self.c2 * speed**2
@@ -103,7 +103,7 @@ class LossMap(Shown):
         turning = (speed_radps > 0) | (torque_nm != 0)
         return np.where(turning, self._at(torque_nm, speed_radps), 0.0)
 
-    def generating_nm(self, electric_power_w: float, speed_radps: Array) -> Array:
+    def generating_nm(self, electric_power_w: float | Array, speed_radps: Array) -> Array:
         """Exact inverse: at a given speed the loss is linear in torque between rows and diagonals of the map."""
         speed, grid_speed = np.asarray(speed_radps, dtype=float)[..., None], self.speed_radps
         i = np.clip(np.searchsorted(grid_speed, speed, "right") - 1, 0, len(grid_speed) - 2)
@@ -113,7 +113,7 @@ class LossMap(Shown):
         breaks = np.concatenate([ends, low + x * step, low + (1 - x) * step, 0 * speed], axis=-1)
         # From zero downwards, the first piece on which the electric power passes the one wanted.
         torque = -np.sort(-np.minimum(breaks, 0.0), axis=-1)
-        surplus = torque * speed + self._at(torque, speed) + electric_power_w
+        surplus = torque * speed + self._at(torque, speed) + np.asarray(electric_power_w)[..., None]
         before, after = surplus[..., :-1], surplus[..., 1:]
         passes = (before >= 0) & (after <= 0) & (before > after)
         first = np.argmax(passes, axis=-1)[..., None]

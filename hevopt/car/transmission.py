@@ -18,6 +18,7 @@ class Gearbox(Shown):
     up_mps, down_mps: (gear - 1,) speeds of the change up from, and down to, gears 1, 2, ...
     shift_fuel_kg, engine_speed_min_radps: cost of a change and lowest engine speed above first gear, where the
     gear is a control; None where it cannot be one
+    shift_gap_s: time without torque at a listed change of gear; 0 for a dual clutch gearbox
     """
 
     name: str
@@ -28,6 +29,7 @@ class Gearbox(Shown):
     engage_before_launch_s: float
     shift_fuel_kg: float | None = None
     engine_speed_min_radps: float = 0.0
+    shift_gap_s: float = 0.0
 
 
 def output_torque_nm(input_nm: Array, ratio: Array, efficiency: Array) -> Array:

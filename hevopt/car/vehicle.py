@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.car.braking import Braking
 from hevopt.display.facts import Shown
 from hevopt.units import STANDARD_GRAVITY_MPS2
 
@@ -17,6 +18,7 @@ class Vehicle(Shown):
 
     road_load: (4,) force on a level road as polynomial of speed, F = r0 + r1 v + r2 v² + r3 v³ (N, m/s);
     rolling resistance times cos of the slope is contained in `rolling_n`, its (4,) share that scales so.
+    braking: what the machine may take of it; None: all that machine and battery can
     """
 
     name: str
@@ -26,6 +28,7 @@ class Vehicle(Shown):
     auxiliary_power_w: float
     rolling_n: tuple[float, float, float, float]
     air_n: tuple[float, float, float, float]
+    braking: Braking | None = None
 
     @property
     def equivalent_mass_kg(self) -> float:

@@ -1,7 +1,8 @@
 """What a car's file may hold: mass, wheels, auxiliaries and road load."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from hevopt.car_files.fields import AuxiliaryPower, Coefficient, Mass, Name
@@ -49,6 +50,28 @@ class RoadLoadFile(FileModel):
         return self
 
 
+class BrakingFile(FileModel):
+    """How much of the braking a machine may take: a share over speed, and what keeps the car stable."""
+
+    speed_kmh: Annotated[
+        list[Annotated[float, Field(ge=0, le=1000)]], Field(min_length=2, max_length=1000)
+    ]
+    machine_share: Annotated[
+        list[Annotated[float, Field(ge=0, le=1)]], Field(min_length=2, max_length=1000)
+    ]
+    axle: Literal["front", "rear"] = "front"
+    load_share: Annotated[float, Field(ge=0.05, le=0.95)]
+    height_share: Annotated[float, Field(ge=0, le=1)]
+
+    @model_validator(mode="after")
+    def _curve(self) -> Self:
+        if len(self.speed_kmh) != len(self.machine_share):
+            raise ValueError("speed_kmh and machine_share must have one length")
+        if (np.diff(self.speed_kmh) <= 0).any():
+            raise ValueError("speed_kmh must increase")
+        return self
+
+
 class CarFile(FileModel):
     """A car without powertrain."""
 
@@ -58,3 +81,4 @@ class CarFile(FileModel):
     wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
     auxiliary_power_w: AuxiliaryPower
     road_load: RoadLoadFile
+    braking: BrakingFile | None = None

@@ -4,6 +4,7 @@ from math import inf
 
 import numpy as np
 
+from hevopt.car.braking import Braking
 from hevopt.car.engine import Engine
 from hevopt.car.engine_laws import CompactLaw, EngineMap, FuelCoefficients, NoxCoefficients
 from hevopt.car.machine import Machine, TorqueCurve
@@ -11,7 +12,7 @@ from hevopt.car.machine_laws import LossByCoefficients, LossByEfficiency, LossLa
 from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
 from hevopt.car_files.battery import BatteryFile, LinearVoltageFile
-from hevopt.car_files.car import CarFile
+from hevopt.car_files.car import BrakingFile, CarFile
 from hevopt.car_files.engine import EngineFile, EngineGridFile
 from hevopt.car_files.fields import FullLoadFile
 from hevopt.car_files.gearbox import GearboxFile
@@ -54,6 +55,17 @@ def vehicle_of(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
         car.auxiliary_power_w,
         rolling,
         air,
+        None if car.braking is None else _braking(car.braking),
+    )
+
+
+def _braking(data: BrakingFile) -> Braking:
+    return Braking(
+        np.array(data.speed_kmh) * TO_SI["_kmh"][1],
+        np.array(data.machine_share),
+        data.axle,
+        data.load_share,
+        data.height_share,
     )
 
 
@@ -112,6 +124,7 @@ def gearbox_of(data: GearboxFile) -> Gearbox:
         data.shift_speeds.engage_before_launch_s,
         None if free is None else free.shift_fuel_g * TO_SI["_g"][1],
         0.0 if free is None else free.engine_speed_min_rpm * TO_SI["_rpm"][1],
+        data.shift_gap_s,
     )
 
 
@@ -125,6 +138,7 @@ def machine_of(data: MachineFile) -> Machine:
         data.inertia_kgm2,
         _loss_law(data),
         None if data.full_load is None else _torque_curve(data.full_load),
+        data.spin_efficiency,
     )
     return machine if data.scale is None else machine.scaled(data.scale.factor)
 

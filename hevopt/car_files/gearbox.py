@@ -26,6 +26,7 @@ class GearboxFile(FileModel):
     ratios: Annotated[list[Ratio], Field(min_length=1, max_length=20)]
     final_drive_ratio: Ratio
     efficiency: Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape]
+    shift_gap_s: Annotated[float, Field(ge=0, le=5)] = 0.0
     shift_speeds: ShiftSpeedsFile
     free_gear: FreeGearFile | None = None
 

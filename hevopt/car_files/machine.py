@@ -64,6 +64,7 @@ class MachineFile(FileModel):
     speed_max_rpm: Positive | None = None
     full_load: FullLoadFile | None = None
     inertia_kgm2: Annotated[float, Field(ge=0, le=100)] = 0.0
+    spin_efficiency: Fraction = 0.85
     efficiency: Fraction | None = None
     loss_c0_w: NotNegative | None = None
     loss_c1_ws: NotNegative | None = None

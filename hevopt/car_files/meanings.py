@@ -77,6 +77,16 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "wheel_inertia_kgm2": ("kg m²", "moment of inertia of all wheels together"),
         "auxiliary_power_w": ("W", "electric load of the on-board network, constant"),
         "road_load": ("", "rolling and air resistance in parts, or coast-down coefficients"),
+        "braking": ("", "how much of the braking a machine may take; without it all that it can"),
+    },
+    "BrakingFile": {
+        "speed_kmh": ("km/h", "speeds of machine_share; beyond the ends its first and last hold"),
+        "machine_share": ("-", "share of the wheels' braking that may pass the machine's axle, friction brakes "
+                          "take the rest; falling to 0 at low speed, where regeneration fades out"),
+        "axle": ("", "axle that the machine brakes; front: it uses no more adhesion than UN Regulation 13-H "
+                 "grants, rear: no more than the front axle does"),
+        "load_share": ("-", "share of the weight on that axle at rest"),
+        "height_share": ("-", "height of the centre of mass over the wheelbase"),
     },
     "RoadLoadFile": {
         "rolling_c0": ("-", "rolling resistance over weight at standstill"),
@@ -98,7 +108,7 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "stroke_mm": ("mm", "stroke; sets the mean piston speed of fuel_coefficients"),
         "idle_rpm": ("1/min", "idle speed, held by a slipping clutch when the car is slower"),
         "inertia_kgm2": ("kg m²", "moment of inertia of crankshaft, flywheel and clutch cover"),
-        "start_fuel_g": ("g", "fuel burnt by one start"),
+        "start_fuel_g": ("g", "fuel burnt by one start beside spinning the engine up, which the battery pays for"),
         "fuel": ("", "what is burnt"),
         "full_load": ("", "highest torque over speed; its ends are the lowest and highest engine speed"),
         "fuel_coefficients": ("", "fuel by p_me = (a + b cm + c cm²) p_mf + a2 p_mf² + l + l2 cm², brake and "
@@ -154,6 +164,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "ratios": ("-", "input speed over output speed of each gear, first gear first, falling"),
         "final_drive_ratio": ("-", "gearbox output speed over wheel speed"),
         "efficiency": ("-", "of gearbox and final drive together: one for all gears, or one per gear"),
+        "shift_gap_s": ("s", "time without torque at a change of gear that cycle or shift speeds list; 0: "
+                        "the gearbox changes under load"),
         "shift_speeds": ("", "when the driver changes gear, on cycles that list none"),
         "free_gear": ("", "limits of a gear that the strategy chooses"),
     },
@@ -175,6 +187,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "full_load": ("", "largest torque over speed, either direction, beside these limits: its first holds down "
                       "to rest, beyond its last there is none"),
         "inertia_kgm2": ("kg m²", "moment of inertia of the rotor"),
+        "spin_efficiency": ("-", "of what passes between the battery's store and a shaft that the machine speeds "
+                            "up or slows at a start or a change of gear: machine, inverter and battery together"),
         "efficiency": ("-", "mechanical to electric and back; kind efficiency only"),
         "loss_c0_w": ("W", "c0 of loss = c0 + c1 w + c2 w² + c3 T², w in rad/s, T in Nm; kind loss only"),
         "loss_c1_ws": ("W s", "c1 of the loss"),

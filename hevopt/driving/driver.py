@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 _SPEED_SHARE_MAX = 0.9
 # The electric load counts at the crankshaft through an alternator no better than this.
 _ALTERNATOR_EFFICIENCY_MIN = 0.5
+# Of a step shorter than the gap so much is without torque.
+_GAP_SHARE_MAX = 0.8
+# What the engine must give beside, for the electric load.
+_NEED_MARGIN = 1.1
 
 
 def change_down(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbox) -> Demand:
@@ -43,9 +47,28 @@ def launch_speed_radps(demand: Demand, engine: Engine, gearbox: Gearbox) -> Arra
     _, need = _engine_speed_and_need(demand, demand.gear, engine, gearbox)
     rising = engine.full_load_speed_radps[: int(np.argmax(engine.full_load_torque_nm)) + 1]
     torque = np.maximum.accumulate(engine.full_load_torque_nm[: len(rising)])
-    needed = np.interp(1.1 * need, torque, rising) if len(rising) > 1 else np.zeros_like(need)
+    needed = (
+        np.interp(_NEED_MARGIN * need, torque, rising) if len(rising) > 1 else np.zeros_like(need)
+    )
     launching = (demand.gear == 1) & (demand.wheel_torque_nm > 0)
     return np.where(launching, np.maximum(needed, engine.idle_radps), engine.idle_radps)
+
+
+def gap_shares(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbox) -> Array:
+    """(time,) share of the step without torque through the gearbox: at a change of gear while driving.
+
+    What is not driven meanwhile is made up for in the rest of the step. A driver from whom that asks more than the
+    engine's full load changes faster.
+    """
+    before = np.concatenate([demand.gear[:1], demand.gear[:-1]])
+    still = demand.wheel_speed_radps == 0
+    changed = (demand.gear != before) & (demand.gear > 0) & (before > 0) & ~still
+    changed[1:] &= ~still[:-1]
+    speed, need = _engine_speed_and_need(demand, demand.gear, engine, gearbox)
+    need = np.maximum(need, 0.0) + vehicle.auxiliary_power_w / _ALTERNATOR_EFFICIENCY_MIN / speed
+    spare = 1 - _NEED_MARGIN * need / engine.full_load_nm(speed)
+    share = np.minimum(gearbox.shift_gap_s / demand.step_s, _GAP_SHARE_MAX)
+    return np.where(changed, np.clip(share, 0.0, np.maximum(spare, 0.0)), 0.0)
 
 
 def _engine_speed_and_need(

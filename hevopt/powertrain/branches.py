@@ -12,6 +12,7 @@ from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.evaluated import evaluated
 from hevopt.powertrain.grids import Gridded, gridded, is_gridded, most_nm
+from hevopt.powertrain.kinetic import Kinetic, kinetic_of
 from hevopt.powertrain.levels import Around, labels, levels_of
 from hevopt.powertrain.operation import Setting, setting
 from hevopt.powertrain.packing import packed
@@ -40,6 +41,7 @@ class Driven(NamedTuple):
     state: State
     labels: tuple[str, ...]
     pieces: tuple[Piece, ...]
+    kinetic: Kinetic
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -111,7 +113,8 @@ def _branch(
         reject[step] = done.reject | bits(Reject.DUPLICATE, chosen.repeats)
         pieces.append(Piece(here, chosen.given))
     reject |= bits(Reject.BATTERY_LIMIT, ~within_limits(car.battery, power))
-    return Branch(Driven(state, named, tuple(pieces)), fuel, nox, power, reject)
+    kinetic = kinetic_of(car, found, demand.step_s)
+    return Branch(Driven(state, named, tuple(pieces), kinetic), fuel, nox, power, reject)
 
 
 def _packed_branch(
@@ -136,7 +139,7 @@ def _packed_branch(
     left = packed(points, len(step_s), car.battery)
     pieces = tuple(Piece(*kept) for kept in left.kept)
     named = tuple(f"point {n}" for n in range(left.reject.shape[1]))
-    driven = Driven(state, named, pieces)
+    driven = Driven(state, named, pieces, kinetic_of(car, found, step_s))
     return Branch(driven, *left[:4], tuple(points))
 
 
@@ -166,7 +169,7 @@ def _most_nm(here: Setting, name: str) -> Array:
         motoring = here.car.functions & {"e_boost", "nox_cut", "power_management"}
         return here.limit_nm(name) if motoring else np.zeros(len(here.shafts.step))
     engine, speed = here.car.engine, here.engine_radps
-    most = engine.covered_nm(speed)
+    most = here.engine_nm(engine.covered_nm)
     shaft = here.way.active[ENGINE]
     unused = engine.inertia_kgm2 * here.shafts.accel_radps2[shaft]
     return np.where(np.isnan(most) | (speed > engine.speed_max_radps), unused, most)

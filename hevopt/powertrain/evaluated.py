@@ -7,7 +7,7 @@ import numpy as np
 
 from hevopt.car.driveline import State
 from hevopt.powertrain.operation import Setting, completed, flowing
-from hevopt.powertrain.rejects import Bits, bits, function_rejects, limit_rejects
+from hevopt.powertrain.rejects import Bits, bits, braking_rejects, function_rejects, limit_rejects
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.reject import Reject
 
@@ -34,6 +34,7 @@ def evaluated(here: Setting, state: State, given: Mapping[str, Array], step_s: A
         bits(Reject.ENGINE_MAP, flows.off_engine_map)
         | bits(Reject.MACHINE_MAP, flows.off_machine_map)
         | limit_rejects(here, torques)
+        | braking_rejects(here, torques, battery)
         | function_rejects(here, state, torques, battery)
     )
     return Evaluated(flows.fuel_kgps * length_s, flows.nox_kgps * length_s, battery, reject)

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hevopt.car.architecture import Architecture
 from hevopt.car.balance import joints_of
 from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.car.parts import WHEEL
 from hevopt.powertrain.branches import Driven, Piece
+from hevopt.powertrain.kinetic import jumps_along
 from hevopt.powertrain.operation import Setting, completed, flowing, setting
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.flows import Flows
@@ -29,7 +31,7 @@ class PowerFlows(Flows):
 
     steps: int
     branches: tuple[Driven, ...]
-    machines: tuple[str, ...]
+    car: Architecture
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._names:
@@ -47,6 +49,11 @@ class PowerFlows(Flows):
             first += width
         return whole
 
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """Names of the machines."""
+        return tuple(name for name, _ in self.car.driveline.machines)
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 
@@ -60,9 +67,13 @@ class PowerFlows(Flows):
 
     def states(self, control: Indices) -> list[State]:
         """The state of the driveline at each step of a plan."""
+        return [self.branches[n].state for n in self._owner(control)]
+
+    def _owner(self, control: Indices) -> Indices:
+        """(time,) index of the branch of each of some controls."""
         widths = [len(branch.labels) for branch in self.branches]
-        owner = np.searchsorted(np.cumsum(widths), control, "right")
-        return [self.branches[n].state for n in owner]
+        owner: Indices = np.searchsorted(np.cumsum(widths), control, "right")
+        return owner
 
     def given(self, control: Indices) -> dict[str, Array]:
         """actuator -> (time,) torque that the plan gives it, NaN where it gives none."""
@@ -74,7 +85,7 @@ class PowerFlows(Flows):
         return found
 
     def along(self, control: Indices) -> dict[str, Array]:
-        """name -> (time,) of one control per step."""
+        """name -> (time,) of one control per step, with what shafts hold and what their jumps take."""
         found = {name: np.zeros(len(control)) for name in self._names}
         for piece, state, level in self._taken(control):
             here, step = piece.here, piece.here.shafts.step[state]
@@ -82,7 +93,9 @@ class PowerFlows(Flows):
             given = {name: torque[state, level][:, None] for name, torque in piece.given.items()}
             for name, flow in self._of(some, given).items():
                 found[name][step] = np.broadcast_to(flow, (len(step), 1))[:, 0]
-        return found
+        on = np.array([branch.state.engine_on for branch in self.branches])
+        kinetics = [branch.kinetic for branch in self.branches]
+        return found | jumps_along(self.car, kinetics, on, self._owner(control))
 
     def _taken(self, control: Indices) -> Iterator[tuple[Piece, Indices, Indices]]:
         """The pieces that a plan drives, the states of each that it takes, and the level at each."""

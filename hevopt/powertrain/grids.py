@@ -182,7 +182,7 @@ def _own_limits(here: Setting, name: str) -> tuple[Array, Array]:
         limit = here.limit_nm(name)
         return -limit, limit
     engine = here.car.engine
-    most = engine.covered_nm(here.engine_radps)
+    most = here.engine_nm(engine.covered_nm)
     least = np.full(most.shape, engine.law.lowest_nm)
     return least, np.fmax(most, least)
 
@@ -191,7 +191,7 @@ def _special(here: Setting, name: str) -> list[Array]:
     """Torques of an actuator that are always among the points."""
     if name != ENGINE:
         return [np.zeros(len(here.shafts.step))]
-    return [here.car.engine.best_nm(here.engine_radps), here.least_nm]
+    return [here.engine_nm(here.car.engine.best_nm), here.least_nm]
 
 
 def most_nm(points: Gridded, stuck: Flags) -> tuple[Indices, Array]:

@@ -69,14 +69,14 @@ def levels_of(here: Setting, state: State, levels: int, around: Around | None) -
     if name is None or name == ENGINE:
         return _single(len(here.shafts.step), count)
     if here.car.driveline.follows_load:
-        torque = _idle_nm(here, name)[:, None]
+        torque = here.idle_nm(name)[:, None]
         return Levels({name: torque}, np.zeros(torque.shape, dtype=bool))
     low, high, best, cut = _open_nm(here, name)
     shares = _shares(state, levels)
     torque = low[:, None] * (1 - shares) + high[:, None] * shares
     repeats = np.zeros((len(low), count), dtype=bool)
     if state.engine_on:
-        idle = _idle_nm(here, name)
+        idle = here.idle_nm(name)
         if not here.way.chosen:
             repeats[:, len(shares) + _SPECIAL_LEVELS.index("best efficiency")] = True
         torque = np.column_stack([torque, np.zeros_like(idle), idle, best, cut])
@@ -97,27 +97,26 @@ def _single(states: int, count: int) -> Levels:
     return Levels({}, repeats)
 
 
-def _idle_nm(here: Setting, name: str) -> Array:
-    """(state,) torque at which a machine supplies the electric load and no more; 0 where it cannot."""
-    load = here.car.vehicle.auxiliary_power_w
-    return np.nan_to_num(here.machines[name].generating_nm(load, here.speed_radps(name)))
-
-
 def _open_nm(here: Setting, name: str) -> tuple[Array, Array, Array, Array]:
     """(state,) lowest and highest torque that the limits of engine and machine leave open, and between them that
     of the engine's best efficiency and that of its lowest torque; both the lowest where no engine acts."""
     limit, wanted = here.limit_nm(name), here.shafts.wheel_nm
     if name in here.way.chosen:
-        engine, speed = here.car.engine, here.engine_radps
-        full = engine.covered_nm(speed)
+        engine = here.car.engine
+        full = here.engine_nm(engine.covered_nm)
         full = np.where(np.isnan(full), np.maximum(here.least_nm, 0.0), full)
-        wished = np.column_stack([full, here.least_nm, engine.best_nm(speed)])
+        wished = np.column_stack([full, here.least_nm, here.engine_nm(engine.best_nm)])
         pinned = here.torques.solve(here.unbraked({ENGINE: wished}), [name])[name]
         low, high, best = np.broadcast_to(pinned, wished.shape).T
+        cut = high
+        if here.friction_nm.any():
+            given = here.least_braked({ENGINE: here.least_nm[:, None]})
+            part = np.broadcast_to(here.torques.solve(given, [name])[name], (len(limit), 1))[:, 0]
+            cut = np.where(part < 0, part, np.maximum(cut, 0.0))
     else:
-        found = here.torques.solve(here.unbraked({}), [name])[name]
+        found = here.torques.solve(here.least_braked({}), [name])[name]
         low = high = best = np.broadcast_to(found, (len(limit), 1))[:, 0]
-    cut = high
+        cut = high
     high = np.where(wanted > 0, high, np.maximum(high, 0.0))
     low, high = np.clip(low, -limit, limit), np.clip(high, -limit, limit)
     if name in here.way.chosen:

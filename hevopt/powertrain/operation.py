@@ -1,6 +1,6 @@
 """A way at its steps with some torques given: what everything else does, burns and draws."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +9,13 @@ from hevopt.car.architecture import Architecture
 from hevopt.car.balance import joints_of
 from hevopt.car.driveline import BRAKE, ENGINE
 from hevopt.car.machine import Machine
+from hevopt.car.parts import WHEEL
 from hevopt.car.ways import Way
 from hevopt.display.facts import Shown
 from hevopt.powertrain.shafts import Shafts
 from hevopt.powertrain.torques import Torques
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.units import STANDARD_GRAVITY_MPS2
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -22,6 +24,8 @@ class Setting(Shown):
 
     least_nm: lowest torque that the engine may have: drag where the wheels turn it (fuel cut), else 0, as it keeps
     itself turning; 0 too at speeds beyond a measured map's, where no torque of the engine is used
+    friction_nm: what the friction brakes take at least where a machine brakes the wheels
+    interrupted: actuators whose torque does not reach the wheels while the listed gearbox changes gear
     """
 
     car: Architecture
@@ -29,6 +33,8 @@ class Setting(Shown):
     shafts: Shafts
     torques: Torques
     least_nm: Array
+    friction_nm: Array
+    interrupted: frozenset[str]
 
     @property
     def engine_radps(self) -> Array:
@@ -46,10 +52,39 @@ class Setting(Shown):
         named = zip(self.car.driveline.machines, self.car.machines, strict=True)
         return {name: machine for (name, _), machine in named if name in self.way.active}
 
+    def active(self, name: str) -> Array:
+        """(state,) share of the step in which an actuator's torque reaches the wheels: less while gears change.
+
+        Torques are means over the step; what reaches the wheels for a share of it only is as much larger then.
+        A machine on the engine's shaft turns on with it.
+        """
+        lasting = self.shafts.gap
+        return 1 - lasting if name in self.interrupted else np.ones(len(lasting))
+
     def limit_nm(self, name: str) -> Array:
         """(state,) largest torque of either sign of a machine; 0 beyond its highest speed."""
         machine, speed = self.machines[name], np.abs(self.speed_radps(name))
-        return np.where(speed <= machine.speed_max_radps, machine.limit_nm(speed), 0.0)
+        limit = np.where(speed <= machine.speed_max_radps, machine.limit_nm(speed), 0.0)
+        return limit * self.active(name)
+
+    def engine_nm(self, of_speed: Callable[[Array], Array]) -> Array:
+        """(state,) one of the engine's torques over speed: full load, drag, what its map covers."""
+        return of_speed(self.engine_radps) * self.active(ENGINE)
+
+    def idle_nm(self, name: str) -> Array:
+        """(state,) torque at which a machine supplies the electric load and no more; 0 where it cannot."""
+        machine, speed, share = self.machines[name], self.speed_radps(name), self.active(name)
+        between_w = (1 - share) * machine.loss_w(np.zeros(len(speed)), speed)
+        load_w = (self.car.vehicle.auxiliary_power_w + between_w) / share
+        return np.nan_to_num(share * machine.generating_nm(load_w, speed))
+
+    def least_braked(self, given: Mapping[str, Array]) -> dict[str, Array]:
+        """Given torques, and the friction brakes' least where something else can move the wheels."""
+        return (
+            {**given, BRAKE: -self.friction_nm[:, None]}
+            if self.way.slack is not None
+            else dict(given)
+        )
 
     def unbraked(self, given: Mapping[str, Array]) -> dict[str, Array]:
         """Given torques, and no friction brake where something else can move the wheels."""
@@ -62,7 +97,35 @@ def setting(car: Architecture, way: Way, shafts: Shafts) -> Setting:
     if ENGINE in way.active and (way.tied or "free" in way.held.values()):
         drag = car.engine.drag_nm(shafts.speed_radps[way.active[ENGINE]])
         least = np.where(np.isnan(drag), 0.0, drag)
-    return Setting(car, way, shafts, Torques(way, shafts), least)
+    cut = _interrupted(way)
+    return Setting(
+        car,
+        way,
+        shafts,
+        Torques(way, shafts),
+        least * (1 - shafts.gap) if ENGINE in cut else least,
+        _friction_nm(car, shafts, shafts.gap if cut.issuperset(way.active) else 0 * shafts.gap),
+        frozenset(n for n in cut if n == ENGINE or way.active[n] != way.active.get(ENGINE)),
+    )
+
+
+def _interrupted(way: Way) -> frozenset[str]:
+    """The actuators that reach the wheels through a gearbox in its listed gear only."""
+    lasting = [set(use.part.shafts) for use in way.uses if use.gear is not None]
+    reached = {WHEEL}
+    for _ in lasting:
+        reached |= {shaft for part in lasting if part & reached for shaft in part}
+    return frozenset(name for name, shaft in way.active.items() if shaft not in reached)
+
+
+def _friction_nm(car: Architecture, shafts: Shafts, gap: Array) -> Array:
+    """(state,) torque of the friction brakes that a machine may not take over, nor can while gears change."""
+    vehicle, asked = car.vehicle, np.maximum(-shafts.wheel_nm, 0.0)
+    if vehicle.braking is None:
+        return asked * gap
+    rate = asked / (vehicle.tyre_radius_m * vehicle.mass_kg * STANDARD_GRAVITY_MPS2)
+    speed = shafts.speed_radps[WHEEL] * vehicle.tyre_radius_m
+    return asked * (1 - (1 - gap) * vehicle.braking.share(speed, rate))
 
 
 def completed(here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
@@ -139,15 +202,24 @@ def flowing(here: Setting, torques: Mapping[str, Array]) -> Flowing:
     fuel = nox = np.zeros((1, 1))
     if ENGINE in here.way.active:
         engine, speed = here.car.engine, here.engine_radps[:, None]
-        fuel = engine.fuel_kgps(torques[ENGINE], speed)
-        nox = np.where(fuel == 0, 0.0, engine.nox_kgps(torques[ENGINE], speed))
+        share = here.active(ENGINE)[:, None]
+        torque = torques[ENGINE] / share
+        fuel = engine.fuel_kgps(torque, speed)
+        nox = np.where(fuel == 0, 0.0, engine.nox_kgps(torque, speed))
+        if (share < 1).any():
+            # While gears change it turns on without load.
+            none = np.zeros(share.shape)
+            fuel = share * fuel + (1 - share) * engine.fuel_kgps(none, speed)
+            nox = share * nox + (1 - share) * engine.nox_kgps(none, speed)
     off_engine = np.isnan(fuel) | np.isnan(nox)
     if off_engine.any():
         fuel, nox = np.nan_to_num(fuel), np.nan_to_num(nox)
     off_machine, electric = np.zeros((1, 1), dtype=bool), {}
     for name, machine in here.machines.items():
-        speed = here.speed_radps(name)[:, None]
-        loss = machine.loss_w(torques[name], speed)
+        speed, share = here.speed_radps(name)[:, None], here.active(name)[:, None]
+        loss = machine.loss_w(torques[name] / share, speed)
+        if (share < 1).any():
+            loss = share * loss + (1 - share) * machine.loss_w(np.zeros_like(speed), speed)
         unknown = np.isnan(loss)
         if unknown.any():
             loss, off_machine = np.where(unknown, 0.0, loss), off_machine | unknown

@@ -8,7 +8,7 @@ Standing, gearboxes are in neutral, so that the engine can turn what lies betwee
 """
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from hevopt.car.parts import Gear
 from hevopt.car.ways import Way, way
 from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
-from hevopt.driving.driver import launch_speed_radps
+from hevopt.driving.driver import gap_shares, launch_speed_radps
 from hevopt.powertrain.shafts import Shafts, shafts_of
 from hevopt.problem.arrays import Array, Flags, Indices
 
@@ -29,11 +29,13 @@ class Driver(Shown):
     """What demand and driver make of the steps, whatever the strategy chooses.
 
     launch_radps: (time,) engine speed at which the clutch closes
+    gap: (time,) share of the step without torque through the listed gearbox
     phases: engine turning or not -> the phases, and (time,) where each holds
     """
 
     demand: Demand
     launch_radps: Array
+    gap: Array
     phases: Mapping[bool, list[tuple[Phase, Flags]]]
 
 
@@ -47,11 +49,13 @@ class Stretch(NamedTuple):
 
 def driver_of(car: Architecture, demand: Demand) -> Driver:
     """The driver of a car on a demand."""
-    launch = np.zeros(len(demand.gear))
+    launch, gap = np.zeros(len(demand.gear)), np.zeros(len(demand.gear))
     if car.engine is not None and car.gearbox is not None:
         launch = launch_speed_radps(demand, car.engine, car.gearbox)
+        if car.gear == "cycle" and car.gearbox.shift_gap_s > 0:
+            gap = gap_shares(demand, car.vehicle, car.engine, car.gearbox)
     phases = {on: _phases(car, demand, launch, engine_on=on) for on in (True, False)}
-    return Driver(demand, launch, phases)
+    return Driver(demand, launch, gap, phases)
 
 
 def stretches(car: Architecture, driver: Driver, state: State) -> list[Stretch]:
@@ -71,6 +75,8 @@ def stretches(car: Architecture, driver: Driver, state: State) -> list[Stretch]:
     for found, parts in merged.values():
         step = np.sort(np.concatenate(parts))
         shafts = shafts_of(car, driver.demand, found, step, driver.launch_radps)
+        if any(use.gear is None for use in found.uses):
+            shafts = replace(shafts, gap=driver.gap[step])
         result.append(Stretch(found, step, shafts))
     return result
 

@@ -18,9 +18,10 @@ from hevopt.errors import DataError, InfeasibleError
 from hevopt.powertrain.branches import Branch, branches, deliverable_nm
 from hevopt.powertrain.flows import PowerFlows
 from hevopt.powertrain.levels import Around
+from hevopt.powertrain.modes import modes_of
 from hevopt.powertrain.rejects import Bits
 from hevopt.powertrain.shortfall import shortfall_message
-from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.table import Control, ControlTable, Signals
@@ -135,7 +136,7 @@ def _stuck(found: list[Branch]) -> Flags:
 def _assemble(
     architecture: Architecture, demand: Demand, found: list[Branch], missing: Array
 ) -> ControlTable:
-    modes, switch_fuel_kg = _modes(architecture, found)
+    modes = modes_of(architecture, [branch.driven for branch in found])
     controls = tuple(
         Control(
             branch.driven.state.engine_on,
@@ -157,44 +158,16 @@ def _assemble(
         nox_kg=whole("nox_kg"),
         battery_power_w=whole("battery_power_w"),
         reject=_rejects(found),
-        mode=np.repeat(modes, [len(branch.driven.labels) for branch in found]),
-        switch_fuel_kg=switch_fuel_kg,
-        switch_allowed=np.ones(switch_fuel_kg.shape, dtype=bool),
+        mode=np.repeat(modes.mode, [len(branch.driven.labels) for branch in found]),
+        switch_fuel_kg=modes.switch_fuel_kg,
+        switch_energy_j=modes.switch_energy_j,
+        switch_allowed=np.ones(modes.switch_fuel_kg.shape[-2:], dtype=bool),
         controls=controls,
         signals=Signals(demand.speed_mps, demand.wheel_power_w, demand.gear, demand.clutch_open),
         flows=PowerFlows(
             len(demand.time_s),
             tuple(branch.driven for branch in found),
-            tuple(name for name, _ in architecture.driveline.machines),
+            architecture,
         ),
         missing_torque_nm=missing,
     )
-
-
-def _modes(car: Architecture, found: list[Branch]) -> tuple[Indices, Array]:
-    """Mode of every branch, and the fuel of going from one mode to another, (mode, mode).
-
-    Gears are modes of their own only where changing them costs something.
-    """
-    costs = {box.name: box.shift_fuel_kg for box in car.driveline.boxes if box.shift_fuel_kg > 0}
-    listed_kg = 0.0 if car.gearbox is None else car.gearbox.shift_fuel_kg or 0.0
-    start_kg = 0.0 if car.engine is None else car.engine.start_fuel_kg
-    keys = [
-        (
-            branch.driven.state.engine_on,
-            tuple(pair for pair in branch.driven.state.gears if pair[0] in costs),
-            branch.driven.state.listed if listed_kg else 0,
-        )
-        for branch in found
-    ]
-    distinct = list(dict.fromkeys(keys))
-    switch = np.zeros((len(distinct), len(distinct)))
-    for i, (was_on, gears_from, listed_from) in enumerate(distinct):
-        for j, (is_on, gears_to, listed_to) in enumerate(distinct):
-            changed = listed_from != listed_to and listed_from > 0 and listed_to > 0
-            switch[i, j] = (
-                (start_kg if is_on and not was_on else 0.0)
-                + sum(costs[name] for name, gear in gears_to if (name, gear) not in gears_from)
-                + (listed_kg if changed else 0.0)
-            )
-    return np.array([distinct.index(key) for key in keys]), switch

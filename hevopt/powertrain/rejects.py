@@ -28,7 +28,9 @@ def limit_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
         found = (
             found
             | bits(
-                Reject.MACHINE_LIMIT, np.abs(torques[name]) > machine.limit_nm(speed) + tolerance
+                Reject.MACHINE_LIMIT,
+                np.abs(torques[name])
+                > machine.limit_nm(speed) * here.active(name)[:, None] + tolerance,
             )
             | bits(Reject.MACHINE_SPEED, speed > machine.speed_max_radps)
         )
@@ -50,12 +52,26 @@ def limit_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
     return found
 
 
+def braking_rejects(here: Setting, torques: Mapping[str, Array], battery_power_w: Array) -> Bits:
+    """Where machines brake the wheels more than their axle may; with a turning engine they may supply the load."""
+    if not here.friction_nm.any():
+        return np.zeros((1, 1), dtype=np.uint16)
+    taken = battery_power_w
+    if ENGINE not in torques:
+        powers = (torques[name] * here.speed_radps(name)[:, None] for name in here.machines)
+        taken = sum(powers, np.zeros((1, 1)))
+    short = -torques[BRAKE] < here.friction_nm[:, None] - 10 * _TORQUE_TOLERANCE_NM
+    return bits(Reject.BRAKING, short & (taken < -_POWER_TOLERANCE_W))
+
+
 def _engine_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
     engine, speed, tolerance = here.car.engine, here.engine_radps[:, None], _TORQUE_TOLERANCE_NM
     torque, least = torques[ENGINE], here.least_nm[:, None]
     slow = here.way.tied & (speed < engine.idle_radps * (1 - 1e-12))
     return (
-        bits(Reject.ENGINE_TORQUE, torque > engine.full_load_nm(speed) + tolerance)
+        bits(
+            Reject.ENGINE_TORQUE, torque > here.engine_nm(engine.full_load_nm)[:, None] + tolerance
+        )
         | bits(Reject.ENGINE_TORQUE, torque < least - tolerance)
         | bits(Reject.ENGINE_SPEED, slow | (speed > engine.speed_max_radps * (1 + 1e-12)))
     )
@@ -87,7 +103,7 @@ def function_rejects(
             motoring = motoring | (torques[name] > _TORQUE_TOLERANCE_NM)
         banned = motoring & (torques[ENGINE] <= 0)
         if not has("nox_cut"):
-            full = here.car.engine.covered_nm(here.engine_radps[:, None])
+            full = here.engine_nm(here.car.engine.covered_nm)[:, None]
             banned = banned | motoring & ~(
                 has("e_boost") & (torques[ENGINE] > full - _BOOST_SLACK_NM)
             )

@@ -21,6 +21,7 @@ class Shafts(Shown):
 
     step, gear: index and listed gear of each state's step; wheel_nm: torque that the wheels ask for
     acting_nm: shaft -> torque that its inertia takes, and on the wheels also what they ask for; none where it is 0
+    gap: share of the step without torque through the listed gearbox
     inertia_w: power that the inertia of the engine takes, and that of all machines
     """
 
@@ -31,6 +32,7 @@ class Shafts(Shown):
     acting_nm: Mapping[str, Array]
     inertia_w: tuple[Array, Array]
     wheel_nm: Array
+    gap: Array
 
     def at(self, coefficient: Coefficient) -> Coefficient:
         """A coefficient in the gear of each state."""
@@ -51,6 +53,7 @@ class Shafts(Shown):
             acting_nm=cut(self.acting_nm),
             inertia_w=(self.inertia_w[0][state], self.inertia_w[1][state]),
             wheel_nm=self.wheel_nm[state],
+            gap=self.gap[state],
         )
 
 
@@ -79,7 +82,8 @@ def shafts_of(
     wheel_nm = demand.wheel_torque_nm[step]
     acting, inertia_w = _inertia(car, way, gear, speeds, accels)
     acting[WHEEL] = acting[WHEEL] + wheel_nm if WHEEL in acting else wheel_nm
-    return Shafts(step, gear, speeds, accels, acting, inertia_w, wheel_nm)
+    gap = np.zeros(step.shape)
+    return Shafts(step, gear, speeds, accels, acting, inertia_w, wheel_nm, gap)
 
 
 def value_of(terms: Terms, inputs: Mapping[str, Array], gear: Indices) -> Array:
@@ -92,6 +96,24 @@ def value_of(terms: Terms, inputs: Mapping[str, Array], gear: Indices) -> Array:
                 coefficient = coefficient[gear]
             total = total + coefficient * values
     return total
+
+
+def placed(car: Architecture) -> list[tuple[int | None, float, str]]:
+    """Index of each machine, None for the engine; its inertia; its shaft."""
+    found: list[tuple[int | None, float, str]] = [
+        (n, machine.inertia_kgm2, shaft)
+        for n, (machine, (_, shaft)) in enumerate(
+            zip(car.machines, car.driveline.machines, strict=True)
+        )
+    ]
+    if car.engine is not None and car.driveline.engine is not None:
+        found.append((None, car.engine.inertia_kgm2, car.driveline.engine))
+    return found
+
+
+def wheel_ratio(way: Way, shaft: str, gear: Indices) -> Array:
+    """(state,) how many times as fast as the wheels a shaft turns, beside what held speeds add."""
+    return value_of(speeds_of(way)[shaft], {WHEEL: np.ones(gear.shape)}, gear)
 
 
 def _inertia(
@@ -109,19 +131,13 @@ def _inertia(
     """
     line, torques = car.driveline, dict[str, Array]()
     powers = [np.zeros(gear.shape), np.zeros(gear.shape)]
-    placed = [
-        (1, machine.inertia_kgm2, shaft)
-        for machine, (_, shaft) in zip(car.machines, line.machines, strict=True)
-    ]
-    if car.engine is not None and line.engine is not None:
-        placed.append((0, car.engine.inertia_kgm2, line.engine))
-    for owner, inertia, shaft in placed:
+    for owner, inertia, shaft in placed(car):
         if shaft not in speeds or inertia == 0:
             continue
         on, torque = shaft, inertia * accels[shaft]
         if line.free_engine_speed:
-            ratio = value_of(speeds_of(way)[shaft], {WHEEL: np.ones(gear.shape)}, gear)
-            on, torque = WHEEL, inertia * ratio**2 * accels[WHEEL]
+            on, torque = WHEEL, inertia * wheel_ratio(way, shaft, gear) ** 2 * accels[WHEEL]
         torques[on] = torques[on] + torque if on in torques else torque
-        powers[owner] = powers[owner] + torque * speeds[on]
+        kind = 0 if owner is None else 1
+        powers[kind] = powers[kind] + torque * speeds[on]
     return torques, (powers[0], powers[1])

@@ -18,6 +18,7 @@ class Reject(IntFlag):
     GIVEN = 512
     MACHINE_MAP = 1024
     BEATEN = 2048
+    BRAKING = 4096
 
 
 REJECT_WORDS: dict[Reject, str] = {
@@ -33,4 +34,5 @@ REJECT_WORDS: dict[Reject, str] = {
     Reject.GIVEN: "marked as not feasible",
     Reject.MACHINE_MAP: "outside the machine map",
     Reject.BEATEN: "beaten by another control",
+    Reject.BRAKING: "more braking than the machine's axle may take",
 }

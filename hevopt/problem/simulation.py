@@ -60,7 +60,7 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
         battery_power_w=power_w,
         cost_kg=float(np.sum(problem.cost_kg[steps, control] + switch.kg)),
         flows=flows,
-        residuals=_residuals(table, flows, power_w),
+        residuals=_residuals(table, flows, power_w, switch.energy_j),
     )
 
 
@@ -148,14 +148,23 @@ def _battery_flows(
     }
 
 
-def _residuals(table: ControlTable, f: Mapping[str, Array], power_w: Array) -> dict[str, Array]:
-    """Power in less power out less loss, component by component."""
+def _residuals(
+    table: ControlTable, f: Mapping[str, Array], power_w: Array, switch_j: Array
+) -> dict[str, Array]:
+    """Power in less power out less loss, component by component; that of shafts between and within the steps."""
     residuals = {"battery": f["battery_chemical_w"] - power_w - f["battery_loss_w"]}
     if not table.flows:
         return residuals
     engine_w = f["engine_torque_nm"] * f["engine_speed_radps"]
     inertia_w = f["engine_inertia_w"] + f["machine_inertia_w"]
     lost_w = f["clutch_loss_w"] + f["gearbox_loss_w"] + f["gear_loss_w"] + f["brake_power_w"]
+    switched_w = spun_w = np.zeros_like(power_w)
+    if "shafts_start_j" in f:
+        within_w = (f["shafts_end_j"] - f["shafts_start_j"]) / table.step_s
+        between_w = (f["shafts_start_j"] - f["shafts_before_j"]) / table.step_s
+        switched_w = (f["spin_fuel_j"] + switch_j - f["spin_loss_j"]) / table.step_s
+        spun_w = between_w
+        residuals |= {"shafts": within_w - inertia_w, "switching": switched_w - between_w}
     return residuals | {
         "engine": f["fuel_power_w"] - engine_w - f["engine_loss_w"],
         "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
@@ -169,5 +178,7 @@ def _residuals(table: ControlTable, f: Mapping[str, Array], power_w: Array) -> d
         - f["engine_loss_w"]
         - lost_w
         - f["machine_loss_w"]
-        - f["battery_loss_w"],
+        - f["battery_loss_w"]
+        + switched_w
+        - spun_w,
     }

@@ -18,10 +18,11 @@ TITLES = (
     "6. Energy at the wheels",
 )
 _LOSSES_ALL = (
-    v.DRIVELINE, v.MACHINE_LOSS, v.CHARGING_LOSS, v.RESISTANCE, v.HYBRID_MASS, v.AUXILIARIES, v.ROAD, LOSSES,
+    v.DRIVELINE, v.MACHINE_LOSS, v.CHARGING_LOSS, v.CELLS, v.EACH_WAY, v.RESISTANCE, v.HYBRID_MASS,
+    v.AUXILIARIES, v.ROAD, LOSSES,
 )  # fmt: skip
-_BRAKING = (*v.ELECTRIC, *v.BRAKING, v.NO_RECOVERY)
-_ENGINE = (v.FREE_STARTS, v.DEAR_STARTS, v.NO_INERTIA)
+_BRAKING = (*v.ELECTRIC, v.ALL_BRAKING, *v.BRAKING, v.NO_RECOVERY)
+_ENGINE = (v.FREE_STARTS, v.DEAR_STARTS, v.NO_INERTIA, v.NO_GAP)
 # What each section with statements varies.
 VARIATIONS_OF = (
     (v.K_PHASES, *_ENGINE, v.ALTERNATOR, *VARIATIONS_OF_B, *_LOSSES_ALL),
@@ -65,11 +66,13 @@ def fuel_of_hybrids(found: Reproduction) -> str:
     """Section 2."""
     text = (
         "The study drives electrically up to some power or speed and gives neither. Ours takes the "
-        "power threshold of least fuel and no speed threshold. Ours brakes with the machine as far "
-        "as machine and battery reach, as if all braking could go through its axle; the friction "
-        "brakes take the rest. The engine's inertia is "
-        "charged on its own shaft, in A and in the hybrids alike: it moves both and hardly their "
-        "ratio."
+        "power threshold of least fuel and no speed threshold. Ours brakes with the machine by a "
+        "share over speed, from none at standstill to 0.8 at 97 km/h; the friction brakes take the "
+        "rest. What the study lets its machine take is not in its text. The inertia of engine and "
+        "machine is charged on their own shafts, in A and in the hybrids alike; a start spins the "
+        "engine up from the battery, a stop and a change up lose what its shaft holds. A change of "
+        "gear of the manual gearbox leaves half a second without torque. The battery's round trip "
+        "is the study's 0.9."
     )
     return "\n\n".join([_section(1, found, text), balances(found), curves(found)])
 

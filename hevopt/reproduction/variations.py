@@ -22,7 +22,8 @@ DRIVELINE_LOSS_ADDED = 0.03
 AUXILIARIES_W = 400.0
 START_FUEL_G = 1.0
 RESISTANCE_SHARE = 0.1
-BRAKING_SHARES = (0.8, 0.6, 0.4)
+BRAKING_SHARES = (0.6, 0.4)
+CELLS_EFFICIENCY, EACH_WAY_EFFICIENCY = 0.99, 0.838
 ELECTRIC_KMH = (20, 30, 40, 50)
 _LOSSES = ("loss_c0_w", "loss_c1_ws", "loss_c2_ws2", "loss_c3_wpnm2")
 
@@ -151,6 +152,21 @@ def _charging_loss(factor: float) -> Callable[[Architecture], dict[str, float]]:
     }
 
 
+def _traction_battery(efficiency: float) -> Callable[[Architecture], dict[str, float]]:
+    """The coulombic efficiency of a battery that drives the car."""
+
+    def changes(car: Architecture) -> dict[str, float]:
+        drives = car.functions - {"start_stop"}
+        return {"battery.coulombic_efficiency": efficiency} if drives else {}
+
+    return changes
+
+
+def _all_braking(car: Architecture) -> dict[str, list[float]]:
+    curve = car.contents["car"]["braking"]["machine_share"]
+    return {"car.braking.machine_share": [1.0] * len(curve)}
+
+
 def machine_efficiency(car: Architecture) -> float:
     """That of a car whose machine's file gives one efficiency."""
     loss = car.machines[0].loss
@@ -195,7 +211,14 @@ FREE_STARTS = Variation("a start costs no fuel", lambda car: {"engine.start_fuel
 DEAR_STARTS = Variation(
     f"a start costs {START_FUEL_G:g} g", lambda car: {"engine.start_fuel_g": START_FUEL_G}
 )
-NO_INERTIA = Variation("no engine inertia", lambda car: {"engine.inertia_kgm2": 0.0})
+NO_INERTIA = Variation(
+    "no inertia of engine and machine",
+    lambda car: {"engine.inertia_kgm2": 0.0, **_times(car, "machine", ("inertia_kgm2",), 0.0)},
+)
+NO_GAP = Variation(
+    "changes of gear interrupt nothing",
+    lambda car: {"gearbox.shift_gap_s": 0.0} if car.contents["gearbox"]["shift_gap_s"] else {},
+)
 DRIVELINE = Variation(f"driveline efficiency less {DRIVELINE_LOSS_ADDED:g}", _driveline)
 MACHINE_LOSS, LESS_MACHINE_LOSS = (
     Variation(f"machine loss x {factor:g}", _machine_loss(factor))
@@ -204,6 +227,13 @@ MACHINE_LOSS, LESS_MACHINE_LOSS = (
 CHARGING_LOSS, LESS_CHARGING_LOSS = (
     Variation(f"coulombic loss x {factor:g}", _charging_loss(factor))
     for factor in (LOSS_FACTOR, LESS_LOSS_FACTOR)
+)
+CELLS, EACH_WAY = (
+    Variation(name, _traction_battery(efficiency))
+    for name, efficiency in (
+        (f"coulombic efficiency of the cells, {CELLS_EFFICIENCY:g}", CELLS_EFFICIENCY),
+        ("battery 0.9 each way", EACH_WAY_EFFICIENCY),
+    )
 )
 RESISTANCE = Variation(
     f"battery resistance x {RESISTANCE_FACTOR:g}",
@@ -219,6 +249,7 @@ AUXILIARIES = Variation(
 ALTERNATOR = Variation("A's alternator as efficient as B's machine", _alternator_as_belt)
 ROAD = Variation(f"rolling and air resistance +{100 * RESISTANCE_SHARE:g} %", _road)
 STEEP_NOX = Variation("steep NOx map", lambda car: {"engine": "engine_diesel_1600_steep_nox"})
+ALL_BRAKING = Variation("machine takes all the braking it can", _all_braking)
 NO_RECOVERY = Variation("no regenerative braking", _no_recovery)
 BRAKING = tuple(
     Variation(

@@ -55,6 +55,8 @@ PARAMETERS = (
     Parameter("coulombic efficiency", "share", ("battery.coulombic_efficiency",), step=0.01),
     Parameter("battery cells in series", "cells", ("battery.cells_in_series",), whole=True),
     Parameter("engine inertia", "kg m²", ("engine.inertia_kgm2",)),
+    Parameter("machine inertia", "kg m²", ("machine.inertia_kgm2",)),
+    Parameter("spin efficiency", "share", ("machine.spin_efficiency",), step=0.05),
     Parameter("fuel of a start", "g", ("engine.start_fuel_g",)),
 )
 

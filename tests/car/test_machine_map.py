@@ -153,7 +153,7 @@ def test_a_wrong_loss_map_is_one_clear_message(tmp_path, loss_map, said):
 
 
 def test_a_car_is_kept_inside_its_machine_map(formula):
-    car = load_architecture("C2")
+    car = load_architecture("C2", {"gearbox.shift_gap_s": 0.0})
     small = replace(car, machines=(sampled(formula, beyond_w=6e3),))
     problem = build_problem(small, load_cycle("nedc"))
     rejected = problem.table.reject & Reject.MACHINE_MAP > 0

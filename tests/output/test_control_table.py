@@ -29,6 +29,11 @@ def their_step(t, energy, power, step):
     return energy - step * voltage * current * efficiency
 
 
+def theirs(t, name, k):
+    """(mode, mode) of what switching takes at a step."""
+    return t[name] if t[name].ndim == 2 else t[name][k]
+
+
 def their_dp(t, nodes):
     """Plain value iteration over stored energy: forward step, np.interp, loops over time and control."""
 
@@ -37,7 +42,7 @@ def their_dp(t, nodes):
         return t["battery_capacity_as"] * (low * soc + (high - low) * soc**2 / 2)
 
     grid = np.linspace(stored(t["soc_min"]), stored(t["soc_max"]), nodes)
-    modes, end = len(t["switch_fuel_kg"]), stored(t["soc_end_min"])
+    modes, end = t["switch_fuel_kg"].shape[-1], stored(t["soc_end_min"])
     value = np.tile(1e-6 * np.maximum(end - grid, 0), (modes, 1))
     values = [value]
     for k in range(len(t["time_s"]) - 1, -1, -1):
@@ -47,7 +52,11 @@ def their_dp(t, nodes):
             total = t["fuel_kg"][k, c] + np.interp(after, grid, value[t["mode"][c]])
             total += 1e-6 * np.maximum(grid[0] - after, 0)
             least[t["mode"][c]] = np.minimum(least[t["mode"][c]], total)
-        value = np.min(t["switch_fuel_kg"][:, :, None] + least[None], axis=1)
+        kg, joule = theirs(t, "switch_fuel_kg", k), theirs(t, "switch_energy_j", k)
+        value = np.array([
+            np.min([kg[m, n] + np.interp(grid - joule[m, n], grid, least[n]) for n in range(modes)], axis=0)
+            for m in range(modes)
+        ])  # fmt: skip
         values.append(value)
     return their_rollout(t, grid, values[::-1], stored(t["soc_start"]))
 
@@ -56,12 +65,14 @@ def their_rollout(t, grid, values, energy):
     fuel, mode, chosen = 0.0, int(t["start_mode"]), []
     for k in range(len(t["time_s"])):
         usable = np.flatnonzero(t["feasible"][k])
-        after = their_step(t, energy, t["battery_power_w"][k, usable], t["step_s"][k])
+        to = t["mode"][usable]
+        between = energy - theirs(t, "switch_energy_j", k)[mode, to]
+        after = their_step(t, between, t["battery_power_w"][k, usable], t["step_s"][k])
         ahead = [
             np.interp(e, grid, values[k + 1][t["mode"][c]])
             for e, c in zip(after, usable, strict=True)
         ]
-        cost = t["fuel_kg"][k, usable] + t["switch_fuel_kg"][mode, t["mode"][usable]]
+        cost = t["fuel_kg"][k, usable] + theirs(t, "switch_fuel_kg", k)[mode, to]
         best = int(np.argmin(cost + np.array(ahead)))
         fuel, energy, mode = fuel + cost[best], after[best], int(t["mode"][usable[best]])
         chosen.append(usable[best])

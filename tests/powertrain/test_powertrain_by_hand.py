@@ -172,15 +172,32 @@ def test_electric_driving_of_c1_drags_the_engine_with_its_fuel_cut():
     assert usable(table, engine_on=False) == []
 
 
-def test_full_regeneration_recovers_braking_less_gear_and_machine_loss():
+def test_full_regeneration_recovers_the_machines_share_of_braking_less_gear_and_machine_loss():
+    # Half of the braking at 16.1 km/h, 0.8 of it at 96.6 km/h.
+    share = 0.5 + 0.3 * (9.7 * 3.6 - 16.1) / (96.6 - 16.1)
     for name, gear, machine, ratio, efficiency in machine_paths(3):
         table = table_of(name, trace(10.0, 9.4, gear=3))
         i = least_power(table, usable(table, engine_on=False, machine_gear=gear))
-        torque = through(wheel_torque(name, 9.7, -0.6), ratio, efficiency)
+        asked = wheel_torque(name, 9.7, -0.6)
+        torque = through(share * asked, ratio, efficiency)
         torque -= machine[4] * ratio * 0.6 / RADIUS
         power = electric_power(machine, torque, ratio * 9.7 / RADIUS) + AUXILIARY
         assert table.battery_power_w[0, i] == pytest.approx(power, rel=1e-9)
-        assert table.flows["brake_power_w"][0, i] == pytest.approx(0, abs=1e-6)
+        friction = -(1 - share) * asked * 9.7 / RADIUS
+        assert table.flows["brake_power_w"][0, i] == pytest.approx(friction, rel=1e-9)
+
+
+def test_regeneration_fades_out_at_low_speed():
+    for name, gear, machine, ratio, _ in machine_paths(1):
+        if name == "C2":
+            table = table_of(name, trace(0.9, 0.7, gear=1))
+            i = least_power(table, usable(table, engine_on=False, machine_gear=gear))
+            share = 0.5 * 0.8 * 3.6 / 16.1
+            torque = through(share * wheel_torque(name, 0.8, -0.2), ratio, 0.95)
+            torque -= machine[4] * ratio * 0.2 / RADIUS
+            power = electric_power(machine, torque, ratio * 0.8 / RADIUS) + AUXILIARY
+            assert share < 0.1
+            assert table.battery_power_w[0, i] == pytest.approx(power, rel=1e-9)
 
 
 def test_hard_braking_of_c1_is_shared_by_drag_machine_limit_and_friction_brakes():
@@ -330,6 +347,47 @@ def test_e_boost_alone_assists_only_where_the_engine_falls_short():
             assert len(assisted) and (assisted == short).all()
 
 
+def changed_gear(problem):
+    gear = problem.table.signals.gear
+    return 1 + np.flatnonzero((gear[1:] != gear[:-1]) & (gear[1:] > 0) & (gear[:-1] > 0))
+
+
+def test_a_change_of_gear_leaves_half_of_the_step_to_give_all_of_its_torque():
+    v, speed = 12.0, RATIO[3] * 12.0 / RADIUS
+    cycle = replace(trace(v, v, v, gear=3), gear=np.array([2, 3, 3]))
+    torque = through(wheel_torque("C2", v), RATIO[3])
+    table = table_of("C2", cycle)
+    (off,) = usable(table, 1, engine_on=False)
+    power = (electric_power(FLYWHEEL, 2 * torque, speed) + electric_power(FLYWHEEL, 0, speed)) / 2
+    assert table.battery_power_w[1, off] == pytest.approx(power + AUXILIARY, rel=1e-9)
+    (alone,) = usable(table, 1, engine_on=True, level="zero torque")
+    burnt = (fuel_kgps(2 * torque, speed) + fuel_kgps(0, speed)) / 2
+    assert table.fuel_kg[1, alone] == pytest.approx(burnt, rel=1e-9)
+    (idle,) = usable(table, 1, engine_on=True, level="battery idle")
+    assert table.battery_power_w[1, idle] == pytest.approx(0, abs=1e-9)
+    strongest = max(usable(table, 1, engine_on=True), key=lambda i: -table.battery_power_w[1, i])
+    assert -table.flows["machine_torque_nm"][1, strongest] <= 60 + 1e-6
+
+
+def test_a_change_of_gear_while_braking_is_left_to_the_friction_brakes():
+    cycle = replace(trace(10.3, 10.0, 9.4, gear=3), gear=np.array([4, 3, 3]))
+    share = 0.5 + 0.3 * (9.7 * 3.6 - 16.1) / (96.6 - 16.1)
+    for name, lasting in (("C2", 0.5), ("D", 1.0), ("E", 1.0)):
+        table = table_of(name, cycle)
+        i = least_power(table, usable(table, 1, engine_on=False), 1)
+        friction = -(1 - lasting * share) * wheel_torque(name, 9.7, -0.6) * 9.7 / RADIUS
+        assert table.flows["brake_power_w"][1, i] == pytest.approx(friction, rel=1e-9)
+
+
+def test_a_driver_who_needs_full_load_changes_gear_faster():
+    cycle = replace(trace(14, 16.4, 18.8, gear=3), gear=np.array([2, 3, 3]))
+    table = table_of("A", cycle)
+    torque = table.flows["engine_torque_nm"][1, 0]
+    speed = table.flows["engine_speed_radps"][1, 0]
+    assert 0.5 * full_load(speed) < torque < full_load(speed)
+    assert usable(table, 1) == [0]
+
+
 @pytest.mark.parametrize("name", ["C1", "E"])
 def test_plan_of_dynamic_programming_balances_and_burns_what_torques_and_speeds_say(name):
     problem = build_problem(load_architecture(name), load_cycle("nedc"), levels=15)
@@ -341,6 +399,8 @@ def test_plan_of_dynamic_programming_balances_and_burns_what_torques_and_speeds_
     # The balances of engine, machine and bus hold by definition; these do not.
     for k, burnt in enumerate(run.fuel_kg - run.switch_fuel_kg):
         torque, speed = f["engine_torque_nm"][k], f["engine_speed_radps"][k]
+        if name == "C1" and np.isin(k, changed_gear(problem)):
+            continue  # a change of gear, by hand below
         firing = speed > 0 and torque > drag_torque(speed) + 1e-6
         expected = fuel_kgps(torque, speed) if firing else 0
         assert burnt == pytest.approx(expected, rel=1e-9, abs=1e-12)
@@ -349,7 +409,7 @@ def test_plan_of_dynamic_programming_balances_and_burns_what_torques_and_speeds_
         assert run.battery_power_w[k] == pytest.approx(power + AUXILIARY, rel=1e-9, abs=1e-6)
     labels = [problem.table.controls[c] for c in run.control]
     on = np.array([True, *(label.engine_on for label in labels)])
-    gears = [2 if name == "E" else 0, *(label.machine_gear for label in labels)]
-    starts, shifts = np.sum(on[1:] & ~on[:-1]), np.count_nonzero(np.diff(gears))
+    starts, raised_j = np.sum(on[1:] & ~on[:-1]), np.sum(f["spin_fuel_j"])
     assert starts > 0
-    assert np.sum(run.switch_fuel_kg) == pytest.approx(0.2e-3 * starts + 0.1e-3 * shifts, rel=1e-12)
+    burnt = 0.2e-3 * starts + raised_j / HEATING_VALUE
+    assert np.sum(run.switch_fuel_kg) == pytest.approx(burnt, rel=1e-12)

@@ -54,7 +54,14 @@ def drawn_point(rng, line):
     }
     acting = {shaft: rng.normal(0, 50, 1) for shaft in found.shafts}
     shafts = Shafts(
-        np.zeros(1, int), np.zeros(1, int), speeds, speeds, acting, (None, None), acting[WHEEL]
+        np.zeros(1, int),
+        np.zeros(1, int),
+        speeds,
+        speeds,
+        acting,
+        (None, None),
+        acting[WHEEL],
+        np.zeros(1),
     )
     given = {name: rng.normal(0, 100, (1, 7)) for name in found.chosen}
     if found.slack is not None:

@@ -7,6 +7,7 @@ A loss has one name, in the picture and in the table of the balance.
 """
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +27,18 @@ CLUTCH, GEARBOX, MACHINE_GEAR = "Clutch slip", "Gearbox losses", "Machine gear l
 MACHINE_LOSS = "Machine losses"
 BATTERY_LOSS, AUXILIARIES, BRAKES = "Battery losses", "Auxiliaries", "Friction brakes"
 SHAFTS, UNREGAINED = "Spinning shafts", "Spin-up not regained"
+NET_DRAWN = "stored energy drawn, net"
+SPUN_BEFORE, SPUN_AFTER = "Shafts at the start", "Shafts at the end"
 # A share of all energy below which a link is rounding.
 _TINY = 1e-9
 
 
 def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) -> Energy:
     """The energy flows of a trajectory over its cycle."""
+    shafts = _shafts(trajectory)
     starts_j = float(np.sum(trajectory.switch_fuel_kg)) * heating_value_jpkg
-    links = _links(trajectory, step_s)
-    links[FUEL, STARTS] = starts_j
+    links = _links(trajectory, step_s, shafts)
+    links[FUEL, STARTS] = starts_j - shafts.fuel_j
     total = {name: float(np.sum(flow * step_s)) for name, flow in trajectory.flows.items()}
     enough = _TINY * sum(abs(energy) for energy in links.values())
     wheel, battery = trajectory.flows["wheel_power_w"], trajectory.battery_power_w
@@ -48,7 +52,8 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
         taken=[
             Item(name="fuel burnt", energy_j=total["fuel_power_w"]),
             Item(name="fuel of starts and shifts", energy_j=starts_j),
-            Item(name="stored energy drawn, net", energy_j=total["battery_chemical_w"]),
+            Item(name=NET_DRAWN, energy_j=total["battery_chemical_w"] + shafts.stored_j),
+            Item(name=SPUN_BEFORE, energy_j=shafts.before_j),
         ],
         spent=[
             Item(name=ROAD, energy_j=total["wheel_power_w"]),
@@ -56,16 +61,14 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
             Item(name=BRAKES, energy_j=total["brake_power_w"]),
             Item(name=ENGINE_LOSS, energy_j=heat_j),
             Item(name=DRAG, energy_j=total["engine_loss_w"] - heat_j),
-            Item(name=STARTS, energy_j=starts_j),
+            Item(name=STARTS, energy_j=starts_j - shafts.fuel_j),
             Item(name=CLUTCH, energy_j=total["clutch_loss_w"]),
             Item(name=GEARBOX, energy_j=total["gearbox_loss_w"]),
             Item(name=MACHINE_GEAR, energy_j=total["gear_loss_w"]),
             Item(name=MACHINE_LOSS, energy_j=total["machine_loss_w"]),
             Item(name=BATTERY_LOSS, energy_j=total["battery_loss_w"]),
-            Item(
-                name=UNREGAINED,
-                energy_j=total["engine_inertia_w"] + total["machine_inertia_w"],
-            ),
+            Item(name=UNREGAINED, energy_j=shafts.lost_j),
+            Item(name=SPUN_AFTER, energy_j=shafts.after_j),
         ],
         residual_j=float(np.sum(trajectory.residuals["whole car"] * step_s)),
         of_which=[
@@ -80,7 +83,28 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
     )
 
 
-def _links(trajectory: Trajectory, step_s: Array) -> dict[tuple[str, str], float]:
+class _Shafts(NamedTuple):
+    """Kinetic energy of the shafts before and after the cycle, and what their jumps take and lose, J."""
+
+    before_j: float
+    after_j: float
+    fuel_j: float
+    stored_j: float
+    lost_j: float
+
+
+def _shafts(trajectory: Trajectory) -> _Shafts:
+    f = trajectory.flows
+    return _Shafts(
+        float(f["shafts_before_j"][0]),
+        float(f["shafts_end_j"][-1]),
+        float(np.sum(f["spin_fuel_j"])),
+        float(np.sum(trajectory.switch_energy_j)),
+        float(np.sum(f["spin_loss_j"])),
+    )
+
+
+def _links(trajectory: Trajectory, step_s: Array, shafts: _Shafts) -> dict[tuple[str, str], float]:
     """(from, to) -> energy over the cycle."""
     f, links = trajectory.flows, {}
 
@@ -92,19 +116,20 @@ def _links(trajectory: Trajectory, step_s: Array) -> dict[tuple[str, str], float
     add(ENGINE, ENGINE_LOSS, f["fuel_power_w"] - np.maximum(engine, 0))
     _electric_links(add, trajectory)
     wheel, spinning = f["wheel_power_w"], f["engine_inertia_w"] + f["machine_inertia_w"]
-    spun_j = 0.0
     for line, here in ((DRIVING, wheel >= 0), (BRAKING, wheel < 0)):
         _driveline_links(add, f, engine, line, here)
         net_j = float(np.sum(np.where(here, spinning, 0) * step_s))
         links[line, SHAFTS], links[SHAFTS, line] = max(net_j, 0.0), max(-net_j, 0.0)
-        spun_j += net_j
     traction_j = float(np.sum(np.maximum(wheel, 0) * step_s))
     braking_j = float(np.sum(np.maximum(-wheel, 0) * step_s))
     links[DRIVING, WHEELS] = traction_j
     links[WHEELS, BRAKING] = min(traction_j, braking_j)
     links[WHEELS, ROAD] = max(traction_j - braking_j, 0.0)
     links[DOWNHILL, BRAKING] = max(braking_j - traction_j, 0.0)
-    links[SHAFTS, UNREGAINED] = max(spun_j, 0.0)
+    links[SPUN_BEFORE, SHAFTS], links[SHAFTS, SPUN_AFTER] = shafts.before_j, shafts.after_j
+    links[FUEL, SHAFTS], links[SHAFTS, UNREGAINED] = shafts.fuel_j, shafts.lost_j
+    links[DRAWN, SHAFTS] = max(shafts.stored_j, 0.0)
+    links[SHAFTS, STORED] = max(-shafts.stored_j, 0.0)
     return links
 
 

@@ -5,7 +5,7 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-ENDS = {"Fuel", "Battery, drawn", "Downhill"}
+ENDS = {"Fuel", "Battery, drawn", "Downhill", "Shafts at the start"}
 
 
 CASES = [
