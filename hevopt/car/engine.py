@@ -25,7 +25,11 @@ _EFFICIENCY_MIN = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Engine(Shown):
-    """An engine and its fuel. full_load_*: (point,) curve of the highest torque over speed."""
+    """An engine and its fuel.
+
+    full_load_*: (point,) curve of the highest torque over speed
+    least_*_s: for how long it stays on, once started, and off, once stopped
+    """
 
     name: str
     idle_radps: float
@@ -37,6 +41,8 @@ class Engine(Shown):
     full_load_speed_radps: Array
     full_load_torque_nm: Array
     law: EngineLaw
+    least_on_s: float = 0.0
+    least_off_s: float = 0.0
 
     @property
     def speed_max_radps(self) -> float:

@@ -83,6 +83,8 @@ def engine_of(data: EngineFile) -> Engine:
         full_load_speed_radps=np.array(data.full_load.speed_rpm) * rpm,
         full_load_torque_nm=np.array(data.full_load.torque_nm),
         law=_engine_map(data.fuel_map) if data.fuel_map is not None else _compact_law(data),
+        least_on_s=data.least_on_s,
+        least_off_s=data.least_off_s,
     )
     return engine if data.scale is None else engine.scaled(data.scale.factor)
 

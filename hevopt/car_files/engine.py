@@ -21,6 +21,7 @@ from hevopt.car_files.fields import (
 from hevopt.car_files.mean_value import MeanValueFile
 from hevopt.files.toml import FileModel
 
+Dwell = Annotated[float, Field(ge=0, le=3600)]
 NotPositive = Annotated[float, Field(ge=-1e6, le=0)]
 # exp() of more than this overflows.
 _EXPONENT_MAX = 700.0
@@ -85,6 +86,8 @@ class EngineFile(FileModel):
     idle_rpm: Annotated[float, Field(ge=50, le=5000)]
     inertia_kgm2: Annotated[float, Field(ge=0, le=100)]
     start_fuel_g: StartFuel
+    least_on_s: Dwell = 0.0
+    least_off_s: Dwell = 0.0
     fuel: FuelFile
     full_load: FullLoadFile
     fuel_coefficients: FuelCoefficientsFile | None = None

@@ -109,6 +109,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "idle_rpm": ("1/min", "idle speed, held by a slipping clutch when the car is slower"),
         "inertia_kgm2": ("kg m²", "moment of inertia of crankshaft, flywheel and clutch cover"),
         "start_fuel_g": ("g", "fuel burnt by one start beside spinning the engine up, which the battery pays for"),
+        "least_on_s": ("s", "least time on, once started; no strategy and no bound stops it sooner"),
+        "least_off_s": ("s", "least time off, once stopped"),
         "fuel": ("", "what is burnt"),
         "full_load": ("", "highest torque over speed; its ends are the lowest and highest engine speed"),
         "fuel_coefficients": ("", "fuel by p_me = (a + b cm + c cm²) p_mf + a2 p_mf² + l + l2 cm², brake and "

@@ -22,6 +22,7 @@ from hevopt.powertrain.modes import modes_of
 from hevopt.powertrain.rejects import Bits
 from hevopt.powertrain.shortfall import shortfall_message
 from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.dwell import RepeatedFlows, with_dwell
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.table import Control, ControlTable, Signals
@@ -55,9 +56,11 @@ def build_problem(
     table = build_table(
         architecture, demand, levels=levels, allow_shortfall=allow_shortfall, around=around
     )
-    return Problem(
+    problem = Problem(
         table, architecture.battery, architecture.soc_start, architecture.soc_end, 0, nox_weight
     )
+    engine = architecture.engine
+    return problem if engine is None else with_dwell(problem, engine.least_on_s, engine.least_off_s)
 
 
 def build_table(
@@ -97,11 +100,13 @@ def build_table(
 
 def torques_of(trajectory: Trajectory, table: ControlTable) -> dict[State, Array]:
     """State of the driveline -> (time,) torque that a trajectory chooses in it, NaN elsewhere."""
-    flows = table.flows
+    flows, control = table.flows, trajectory.control
+    if isinstance(flows, RepeatedFlows):
+        flows, control = flows.flows, flows.columns[control]
     if not isinstance(flows, PowerFlows):
         raise DataError("torques are refined around a plan of a table that build_problem has made")
-    states = flows.states(trajectory.control)
-    given = flows.given(trajectory.control)
+    states = flows.states(control)
+    given = flows.given(control)
     torque = np.full(len(states), np.nan)
     for values in given.values():
         torque = np.where(np.isnan(torque), values, torque)

@@ -21,25 +21,25 @@ from hevopt.problem.table import MODES_MAX, ControlTable
 _ROUNDING = 1e-9
 
 
-class _RepeatedFlows(Flows):
-    """Flows of controls that stand several times."""
+class RepeatedFlows(Flows):
+    """Flows of controls that stand several times; columns: (control,) the one that each repeats."""
 
-    __slots__ = ("_columns", "_flows")
+    __slots__ = ("columns", "flows")
 
     def __init__(self, flows: Flows, columns: Indices) -> None:
-        self._flows, self._columns = flows, columns
+        self.flows, self.columns = flows, columns
 
     def __getitem__(self, name: str) -> Array:
-        return self._flows[name][:, self._columns]
+        return self.flows[name][:, self.columns]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._flows)
+        return iter(self.flows)
 
     def __len__(self) -> int:
-        return len(self._flows)
+        return len(self.flows)
 
     def along(self, control: Indices) -> dict[str, Array]:
-        return self._flows.along(self._columns[control])
+        return self.flows.along(self.columns[control])
 
 
 def with_dwell(problem: Problem, least_on_s: float, least_off_s: float) -> Problem:
@@ -87,7 +87,7 @@ def with_dwell(problem: Problem, least_on_s: float, least_off_s: float) -> Probl
 
 
 def _repeated(flows: Mapping[str, Array], columns: Indices) -> Mapping[str, Array]:
-    return _RepeatedFlows(flows, columns) if isinstance(flows, Flows) else flows
+    return RepeatedFlows(flows, columns) if isinstance(flows, Flows) else flows
 
 
 def _turning(table: ControlTable) -> Flags:

@@ -15,12 +15,14 @@ class Rule(NamedTuple):
 
     electric: (time,) while more than least_j is stored, -1 where never
     fixed: (time,) else, -1 where the engine drives; modes: (entry,) that all entries lead to
+    price_kgpj: what a joule of the battery is worth where the table forbids what the rule would take
     """
 
     electric: Indices
     fixed: Indices
     modes: Indices
     least_j: float
+    price_kgpj: float
 
 
 class Driven(NamedTuple):
@@ -68,9 +70,36 @@ def load_point_choices(
 
 
 @compiled()
-def taken(wanted: int, fallback: int, energy_j: float, least_j: float) -> int:
-    """What a rule takes: the wanted while more than least_j is stored, else the fallback."""
-    return wanted if energy_j > least_j else fallback
+def permitted(
+    entry: int, k: int, before: int, modes: Indices, price_kgpj: float, choices: Choices
+) -> int:
+    """An entry, or where the table forbids its mode after another: its like in a mode that is not, or the entry
+    of least cost and worth of charge in one. The entry itself where all are forbidden.
+    """
+    first, cost, power = choices.first, choices.cost_kg, choices.power_w
+    case, allowed = choices.switching.case[k], choices.switching.allowed
+    if allowed[case, before, modes[entry]]:
+        return entry
+    best, least = entry, np.inf
+    for i in range(first[k, 0], first[k, -1]):
+        if allowed[case, before, modes[i]]:
+            if cost[i] == cost[entry] and power[i] == power[entry]:
+                return i
+            total = cost[i] + price_kgpj * power[i] * choices.step_s[k]
+            if total < least:
+                best, least = i, total
+    return best
+
+
+@compiled()
+def entry_at(
+    rule: Rule, engine: Indices, k: int, energy_j: float, mode: int, choices: Choices
+) -> int:
+    """What a rule takes at a step: the electric entry while more than least_j is stored; engine: (time,)."""
+    entry = rule.fixed[k] if rule.fixed[k] >= 0 else engine[k]
+    if rule.electric[k] >= 0 and energy_j > rule.least_j:
+        entry = rule.electric[k]
+    return permitted(entry, k, mode, rule.modes, rule.price_kgpj, choices)
 
 
 @compiled()
@@ -87,9 +116,7 @@ def _drive(
     case, _, switch_j, _ = choices.switching
     modes, (entry, energy, mode) = rule.modes, driven
     for k in range(begin, len(step_s)):
-        fallback = rule.fixed[k] if rule.fixed[k] >= 0 else engine[k]
-        wanted = rule.electric[k] if rule.electric[k] >= 0 else fallback
-        chosen = taken(wanted, fallback, energy[k], rule.least_j)
+        chosen = entry_at(rule, engine, k, energy[k], mode[k], choices)
         between = energy[k] - switch_j[case[k], mode[k], modes[chosen]]
         entry[k], mode[k + 1] = chosen, modes[chosen]
         energy[k + 1] = between - step_s[k] * chemical_power_at(power[chosen], between, battery)

@@ -55,13 +55,11 @@ class Rules(Shown):
 class Outcome(Shown):
     """One member of a rule family: its controls, cost, NOx and end charge.
 
-    wanted, fallback: (time,) controls that are taken while more than least_j is stored, and else
-    control: (time,) those that were
+    rule, engine: what it takes, and the engine's entries (time,); control: (time,) controls that were taken
     """
 
-    wanted: Indices
-    fallback: Indices
-    least_j: float
+    rule: kernels.Rule
+    engine: Indices
     control: Indices
     cost_kg: float
     nox_kg: float
@@ -73,14 +71,15 @@ class Outcome(Shown):
 class Calibrated(Shown):
     """A stepper of the member that a calibration chose, and its plan, which tells of all members."""
 
+    choices: Choices
     outcome: Outcome
     plan: Plan
 
     def decide(self, k: int, energy_j: float, mode: int) -> int:
         """Index of the control that the rule takes at step k."""
-        rule = self.outcome
-        wanted, fallback = int(rule.wanted[k]), int(rule.fallback[k])
-        return int(kernels.taken(wanted, fallback, energy_j, rule.least_j))
+        rule, engine = self.outcome.rule, self.outcome.engine
+        entry = kernels.entry_at(rule, engine, k, energy_j, mode, self.choices)
+        return int(self.choices.control[entry])
 
 
 def rules_of(problem: Problem) -> Rules:
@@ -130,6 +129,7 @@ def neutral_outcome(rules: Rules, threshold_w: float, engine: Indices) -> Outcom
         fixed=np.where(stopped, rules.off, np.where(rules.braking, rules.recover, -1)),
         modes=problem.table.mode[choices.control],
         least_j=low + _SOC_LEVEL_SHARE * (high - low),
+        price_kgpj=rules.price_kgpj,
     )
     driven, burning = kernels.neutral_drive(
         rule, engine, choices, State(problem.start_mode, problem.start_j), problem.end_min_j,
@@ -174,7 +174,7 @@ def calibrated(
     chosen = min(eligible, key=lambda n: figure(calibration[n]))
     outcome = members[chosen][1]
     notes = {"calibration": calibration, "chosen": chosen}
-    return Calibrated(outcome, Plan(outcome.control, notes))
+    return Calibrated(rules.choices, outcome, Plan(outcome.control, notes))
 
 
 def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
@@ -193,17 +193,14 @@ def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
 def _outcome(rules: Rules, rule: kernels.Rule, driven: kernels.Driven, engine: Indices) -> Outcome:
     """What a drive under a rule with the engine's entries, (time,), comes to."""
     problem, choices = rules.problem, rules.choices
-    fallback = np.where(rule.fixed >= 0, rule.fixed, engine)
-    wanted = np.where(rule.electric >= 0, rule.electric, fallback)
     control, energy_j = choices.control[driven.entry], driven.energy_j
     steps = np.arange(choices.steps)
     switch = switched(problem.table, problem.start_mode, control)
     stored = np.concatenate([energy_j, energy_j[:-1] - switch.energy_j])
     least_j, greatest_j = problem.battery.granted_window_j
     return Outcome(
-        choices.control[wanted],
-        choices.control[fallback],
-        rule.least_j,
+        rule,
+        engine,
         control,
         total_cost_kg(problem, control)[0],
         float(np.sum(problem.table.nox_kg[steps, control])),
