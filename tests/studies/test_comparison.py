@@ -140,22 +140,22 @@ def test_energy_balances_in_every_step_and_component(driven_of, car, cycle):
         }
         for component, residual in trajectory.residuals.items():
             assert np.max(np.abs(residual) / scale) < 1e-9, (name, component)
-        _check_whole_cycle(problem, load_architecture(car).engine, trajectory)
+        _check_whole_cycle(load_architecture(car).engine, trajectory)
 
 
-def _check_whole_cycle(problem, engine, trajectory):
+def _check_whole_cycle(engine, trajectory):
     """Fuel, stored energy and what shafts hold at the start against everything spent, to 1e-9 of the fuel."""
-    f, step_s = trajectory.flows, problem.table.step_s
+    f, table = trajectory.flows, trajectory.problem.table
     taken = engine.heating_value_jpkg * (trajectory.total_fuel_kg) + f["shafts_before_j"][0]
     taken += trajectory.energy_j[0] - trajectory.energy_j[-1]
-    on = np.array([True, *(problem.table.controls[c].engine_on for c in trajectory.control)])
+    on = np.array([True, *(table.controls[c].engine_on for c in trajectory.control)])
     starts_j = engine.start_fuel_kg * engine.heating_value_jpkg * np.sum(on[1:] & ~on[:-1])
     spent = starts_j + np.sum(f["spin_loss_j"]) + f["shafts_end_j"][-1]
     for name in (
         "engine_loss_w", "clutch_loss_w", "gearbox_loss_w", "gear_loss_w", "machine_loss_w",
         "brake_power_w", "battery_loss_w", "auxiliary_power_w", "wheel_power_w",
     ):  # fmt: skip
-        spent += np.sum(f[name] * step_s)
+        spent += np.sum(f[name] * table.step_s)
     fuel_j = engine.heating_value_jpkg * trajectory.total_fuel_kg
     assert abs(taken - spent) < 1e-9 * fuel_j
 
