@@ -102,7 +102,8 @@ def torques_of(trajectory: Trajectory, table: ControlTable) -> dict[State, Array
     """State of the driveline -> (time,) torque that a trajectory chooses in it, NaN elsewhere."""
     flows, control = table.flows, trajectory.control
     if isinstance(flows, RepeatedFlows):
-        flows, control = flows.flows, flows.columns[control]
+        control = flows.columns[control]
+        flows = flows.flows
     if not isinstance(flows, PowerFlows):
         raise DataError("torques are refined around a plan of a table that build_problem has made")
     states = flows.states(control)
