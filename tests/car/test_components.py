@@ -145,11 +145,11 @@ def test_cell_gives_730_w_at_2_5_v(car):
     ]  # fmt: skip
 
 
-def test_pack_stores_1600_wh_and_ten_kw_round_trip_is_about_0_86(car):
+def test_pack_stores_1600_wh_and_ten_kw_round_trip_is_about_0_85(car):
     assert battery_model.energy_j(car.battery, 1.0) / 3600 == pytest.approx(1600, rel=0.01)
     middle = float(battery_model.energy_j(car.battery, 0.6))
     drained, stored = (chemical_power_at(p, middle, car.battery.arrays) for p in (10e3, -10e3))
-    assert 10e3 / drained * -stored / 10e3 == pytest.approx(0.942 * 0.914, abs=2e-3)
+    assert 10e3 / drained * -stored / 10e3 == pytest.approx(0.931 * 0.914, abs=2e-3)
 
 
 def curved_battery():
