@@ -1,6 +1,5 @@
 """The documentation: every command and example on it runs, and the site builds without a warning."""
 
-import importlib.util
 import re
 import shlex
 import shutil
@@ -10,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from benchmarks import run, track
 from matplotlib import pyplot
 
 import hevopt
@@ -144,13 +144,18 @@ def test_the_page_of_strategies_is_made(quick, monkeypatch, tmp_path, capsys):
 
 
 def test_benchmarks_measure_the_kernel_and_name_every_figure():
-    path = ROOT / "tests" / "benchmarks" / "run.py"
-    spec = importlib.util.spec_from_file_location("benchmarks", path)
-    benchmarks = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(benchmarks)
-    problem = benchmarks.foreign_problem()
-    call, count = benchmarks.backward_call(problem, 101)
+    problem = run.foreign_problem()
+    call, count = run.backward_call(problem, 101)
     assert call().shape == (1401, 1, 101) and count > 1e6
     committed = (ROOT / "reports" / "benchmarks.md").read_text()
     for figure in ("dp kernel", "ratio", "first time", "--help", "lower-bound DP", "nodes 201"):
         assert figure in committed
+
+
+def test_figures_of_a_commit_stand_beside_those_of_the_newest_before_it_on_such_a_machine(tmp_path):
+    paths = [
+        track.written(tmp_path, number, "abc", {"machine": machine, "figures": {"help_s": s}})
+        for number, machine, s in ((98, "this", 0.3), (99, "this", 0.2), (100, "other", 0.4), (101, "this", 0.1))
+    ]  # fmt: skip
+    assert track.before(tmp_path, paths[3], "this") == {"help_s": 0.2}
+    assert track.before(tmp_path, paths[0], "this") == {}
