@@ -97,6 +97,7 @@ def test_numbers_of_the_theory_are_those_of_the_code():
         "_BANDS": ", ".join(f"{band:g}" for band in dp._BANDS),
         "_GAIN_WORTH_MORE": f"{1e5 * dp._GAIN_WORTH_MORE:g}·10⁻⁵ of the cost",
         "_PROMISE_TOLERANCE": f"{100 * dp._PROMISE_TOLERANCE:g} %",
+        "_FINER": f"{dp._FINER}",
     }
     for name, value in numbers.items():
         assert f"| {value} | `{name}` |" in text

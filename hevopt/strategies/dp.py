@@ -8,7 +8,8 @@ rollout, whose path is exact, stays within the window and ends with at least the
 the window, and for charge missing at the end, a finite price takes the place of infinity, so that interpolation
 stays meaningful: a gentle one first, and charge beyond a full battery may be thrown away, which makes every
 dominated choice superfluous. Where the rollout cannot keep what the value function promised, that gentleness
-misled it, and steep prices with all choices follow.
+misled it, and steep prices with all choices follow; where they cannot keep theirs either, as in windows that hold
+few steps' energy, once more on finer grids.
 
 The first grid spans the SOC window; the next ones ever narrower bands around the path found.
 """
@@ -38,6 +39,9 @@ _GAIN_WORTH_MORE = 2e-5
 _GENTLE, _STEEP = 5.0, 1e4
 # A rollout dearer than promised by this share has been misled.
 _PROMISE_TOLERANCE = 1e-3
+_NODES_MAX = 1_000_000
+# Times as many nodes where steep prices mislead as well.
+_FINER = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +58,8 @@ class _Setting:
 
 def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -> Plan:
     """The plan of least cost on grids of `nodes` stored energies; without `refine`, on the first grid only."""
-    if not 3 <= nodes <= 1_000_000:
-        raise DataError(f"energy nodes {nodes}; allowed: 3 to 1000000")
+    if not 3 <= nodes <= _NODES_MAX:
+        raise DataError(f"energy nodes {nodes}; allowed: 3 to {_NODES_MAX}")
     every = choices_of(problem)
     reach = reach_of(problem, every, problem.end_min_j)
     price = one_price_dual(problem)[-1].price_kgpj
@@ -65,11 +69,13 @@ def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -
     )
     bands = _BANDS if refine else _BANDS[:1]
     cost, control, promised = _search(gentle, bands, nodes)
-    if cost - promised > _PROMISE_TOLERANCE * abs(cost):
-        steep = _Setting(problem, every, every, reach, _STEEP * worth, hard_top=True)
-        steep_cost, steep_control, _ = _search(steep, bands, nodes)
+    steep = _Setting(problem, every, every, reach, _STEEP * worth, hard_top=True)
+    for finer in (nodes, min(_FINER * nodes, _NODES_MAX)):
+        if cost - promised <= _PROMISE_TOLERANCE * abs(cost):
+            break
+        steep_cost, steep_control, promised = _search(steep, bands, finer)
         if steep_cost < cost:
-            control = steep_control
+            cost, control = steep_cost, steep_control
     return Plan(control, {"price_kgpj": price, "nodes": nodes})
 
 
