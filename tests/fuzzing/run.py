@@ -11,6 +11,7 @@ What it has found, all mended since:
 - A KeyError in `validate`; two RuntimeWarnings on maps that are zero all over.
 - Spoilt stores of sweeps that SQLite reads well ended `report` and `sweep --status` in a JSONDecodeError.
 - Of a store whose schema is spoilt, SQLite's message quotes control characters.
+- `cycles import` quoted the whole of a log of signals whose header ran into its rows, control characters included.
 - Stores and saved comparisons, changed value by value: KeyError, ZeroDivisionError, OverflowError, AttributeError,
   UnicodeEncodeError and ValueError of `report` and `sweep`; a view without an end; lists of 11 GB.
 - `coastdown` named every column of a file with thousands, in a message of 22 000 characters.

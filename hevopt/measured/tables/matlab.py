@@ -17,7 +17,7 @@ from hevopt.errors import DataError
 from hevopt.measured.tables.cells import LARGEST, LISTED, Cells
 from hevopt.measured.tables.matlab_cycles import CONVENTION, arranged, array_unit
 from hevopt.measured.tables.names import cleaned
-from hevopt.measured.tables.rows import CELLS_MAX, ROWS_MAX, Table
+from hevopt.measured.tables.rows import CELLS_MAX, ROWS_MAX, Table, listed
 
 _UNPACKED_MAX = 200_000_000
 _COLUMNS_MAX = 2_000
@@ -178,7 +178,7 @@ def columns_table(path: Path, variables: Variables) -> Table:
             units.append(array_unit(name, array, i))
             columns.append(cells_of(array[:, i]))
     notes = ["MATLAB file, lines are row numbers", *arranging]
-    left_out = f"left out, not of {rows} rows of numbers: {', '.join(others)}" * bool(others)
+    left_out = f"left out, not of {rows} rows of numbers: {listed(others, ', ')}" * bool(others)
     lines = np.arange(1, rows + 1)
     return Table(names, units, columns, lines, notes, CONVENTION, left_out=left_out)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError
 from hevopt.measured.tables.cells import Cells, marks_of, read_chunk
 from hevopt.measured.tables.names import cleaned
-from hevopt.measured.tables.rows import CELLS_MAX, ROWS_MAX, Row, Table
+from hevopt.measured.tables.rows import CELLS_MAX, ROWS_MAX, Row, Table, listed
 from hevopt.units import unit_named
 
 Rows = NDArray[np.int64]
@@ -49,7 +49,7 @@ def signals_table(path: Path, header: Row, rows: Iterable[Row]) -> Table:
     if short or not times:
         raise DataError(
             f"{path}, line {short[0] if short else header[0]}: not a row of "
-            f"{', '.join(name.upper() for name in place if name)}; complete or remove it"
+            f"{listed([name.upper() for name in place if name], ', ')}; complete or remove it"
         )
     if len(times) > ROWS_MAX:
         raise DataError(f"{path}: more than {ROWS_MAX} rows; shorten the file")
@@ -66,8 +66,8 @@ def _table(
     kept, left_out = found, ""
     if len(found) * len(times) > CELLS_MAX:
         kept = {key: of for key, of in found.items() if _of_drive(key[1])}
-        others = ", ".join(name for name, _ in found.keys() - kept.keys())
-        left_out = f"left out, signals without a unit of speed or length: {others}"
+        others = [name for name, unit in found if (name, unit) not in kept]
+        left_out = f"left out, signals without a unit of speed or length: {listed(others, ', ')}"
     time = Cells()
     read_chunk(time, times, lines, 0)
     twice = {name for name, _ in kept if sum(name == other for other, _ in kept) > 1}

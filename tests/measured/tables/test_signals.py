@@ -67,6 +67,12 @@ def test_a_row_cut_short_is_named(tmp_path):
     )
 
 
+def test_a_header_that_runs_into_its_rows_is_quoted_shortly_and_printable(tmp_path):
+    said = refusal(tmp_path, log().replace("\n", "\x0b").replace("Speed (GPS)", "Speed \x03"))
+    assert "not a row of SECONDS, PID, VALUE" in said and "more; complete or remove it" in said
+    assert said.isprintable() and len(said) < 500
+
+
 def test_of_too_many_signals_those_of_a_drive_are_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(signals, "CELLS_MAX", 700)
     result = imported(tmp_path, log())
