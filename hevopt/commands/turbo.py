@@ -83,7 +83,9 @@ def tipin(
             "--integrator", help="rk4 with a fixed step, or lsoda, which chooses its own."
         ),
     ] = "rk4",
-    step_ms: Annotated[float, typer.Option("--step", help="Step of rk4, ms.")] = 0.25,
+    step_ms: Annotated[
+        float | None, typer.Option("--step", help="Step of rk4, ms (0.25 without this).")
+    ] = None,
     changes: Annotated[
         list[str] | None,
         typer.Option(
@@ -101,15 +103,21 @@ def tipin(
 
     Each list gives cases of its own, laid over the car as it is.
     """
+    from hevopt.mean_value.run import STEP_S
     from hevopt.studies.study_file import assignments
     from hevopt.tipin.study import cases_of, manoeuvre_of, study_of
 
+    if step_ms is not None and integrator == "lsoda":
+        raise DataError(
+            "--step is of rk4; lsoda chooses its own: leave one of --step and --integrator out"
+        )
+    step_s = STEP_S if step_ms is None else step_ms / 1e3
     lists = {
         "smoke": smoke, "turbo_inertia": turbo_inertia, "final_drive": final_drive,
         "gear_ratio": gear_ratio, "egr": egr,
     }  # fmt: skip
     manoeuvre = manoeuvre_of(
-        car, speed_kmh / 3.6, gear, integrator=integrator, step_s=step_ms / 1e3,
+        car, speed_kmh / 3.6, gear, integrator=integrator, step_s=step_s,
         changes=assignments(changes or []),
     )  # fmt: skip
     values = {name: _numbers(f"--{name.replace('_', '-')}", text) for name, text in lists.items()}

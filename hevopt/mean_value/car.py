@@ -1,6 +1,6 @@
 """A car in a gear for the mean-value engine, and its state at constant speed."""
 
-from math import atanh, isfinite
+from math import atanh
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,23 +86,37 @@ def cruise(model: Model, speed_mps: float) -> Array:
     engine_radps = car.ratio_radpm * speed_mps + slip
     try:
         state = steady_state(held(model, torque), engine_radps, speed_mps, torque / full)
-    except SolverError:
-        state = None
-    if state is None or state[s.PEDAL] >= 1.0 or not isfinite(state[s.PEDAL]):
-        most = settled_torque_nm(model, engine_radps)
-        raise DataError(
-            f"{kmh:g} km/h needs {torque:.0f} Nm at {rpm:.0f} rpm, and the engine settles to {most:.0f} Nm there "
-            "with full pedal: its smoke limit leaves no more fuel to the air it gets; lower the limit, or choose a "
-            "lower gear"
-        )
+        unsettled = None
+    except SolverError as error:
+        unsettled = error
+    if unsettled is not None or not 0.0 <= state[s.PEDAL] < 1.0:
+        needed = f"{kmh:g} km/h needs {torque:.0f} Nm at {rpm:.0f} rpm"
+        _refuse_load(model, engine_radps, torque, needed)
+        raise unsettled or SolverError(f"{needed}, at which the engine does not settle")
     state[s.TYRE] = force
     return state
 
 
-def settled_torque_nm(model: Model, engine_radps: float) -> float:
-    """Torque that full pedal settles to at a held engine speed."""
+def _refuse_load(model: Model, engine_radps: float, torque: float, needed: str) -> None:
+    """DataError where a torque lies beyond what the pedal settles to at either end."""
+    most = settled_torque_nm(model, engine_radps)
+    if most <= torque:
+        raise DataError(
+            f"{needed}, and the engine settles to {most:.0f} Nm there with full pedal: its smoke limit leaves no "
+            "more fuel to the air it gets; lower the limit, or choose a lower gear"
+        )
+    least = settled_torque_nm(model, engine_radps, pedal=0.0)
+    if least >= torque:
+        raise DataError(
+            f"{needed}, and with the pedal released the engine settles to {least:.0f} Nm there; choose a higher "
+            "gear"
+        )
+
+
+def settled_torque_nm(model: Model, engine_radps: float, pedal: float = 1.0) -> float:
+    """Torque that a pedal settles to at a held engine speed."""
     from hevopt.mean_value._run_kernels import observe
 
-    state = steady_state(held(model), engine_radps)
+    state = steady_state(held(model), engine_radps, pedal=pedal)
     signals = observe(np.zeros(1), state[None], held(model))[0]
     return float(signals[s.SIGNALS.index("torque_nm")])

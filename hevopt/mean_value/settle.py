@@ -13,14 +13,18 @@ from hevopt.mean_value._gas_kernels import coefficients
 from hevopt.mean_value._run_kernels import TABLEAUX, jacobian, march, rates
 from hevopt.mean_value.parameters import Drive, Model
 from hevopt.mean_value.rotor import scaled_inertia_kgm2
-from hevopt.mean_value.stability import longest_step_s, scales
+from hevopt.mean_value.stability import eigenvalues, longest_step_s, scales
 
 Array = NDArray[np.float64]
 
 # Rates of a steady state, relative to the states' scales.
 SETTLED_PS = 1e-10
 _STEP_S = 0.25e-3
-_MARCH_S, _MARCHES, _NEWTON_STEPS = 4.0, 8, 12
+_MARCH_S, _MARCHES, _NEWTON_STEPS = 4.0, 30, 12
+# Growth of a swing that counts as none.
+_GROWTH_PS = 0.05
+# Steps of all marches together: a file whose volumes are tiny would march for minutes.
+_STEPS_MAX = 2_000_000
 _THIN_WALL_JPK = 30.0
 _LARGEST_CHANGE = 0.3
 # Temperatures from which a march begins, by volume, and of the wall.
@@ -38,7 +42,7 @@ def held(model: Model, seek_nm: float = np.nan) -> Model:
 def steady_state(
     model: Model, engine_radps: float, road_mps: float = 0.0, pedal: float = 1.0
 ) -> Array:
-    """(state,) where the model rests at held speeds, its pedal given or sought; SolverError where it does not.
+    """(state,) where the model rests at held speeds, its pedal given or sought; SolverError where it does nowhere.
 
     What the balances count is 0.
     """
@@ -52,16 +56,29 @@ def steady_state(
     )
     thin = model._replace(engine=quick)
     free = [*range(s.PEDAL), *([] if np.isnan(model.drive.seek_nm) else [s.PEDAL])]
-    for _ in range(_MARCHES):
-        y = _marched(thin, y)
+    steps = marched = 0
+    while marched < _MARCHES and steps < _STEPS_MAX:
+        y, taken = _marched(thin, y)
+        marched, steps = marched + 1, steps + taken
         found = _newton(thin, y, free)
         if found is not None:
             found[s.DYNAMIC :] = 0.0
+            _check_stable(held(model), found)
             return found
     raise SolverError(
-        f"the engine does not settle at {engine_radps * 30 / np.pi:.0f} rpm: after {_MARCH_S * _MARCHES:g} s its "
+        f"the engine does not settle at {engine_radps * 30 / np.pi:.0f} rpm: after {_MARCH_S * marched:g} s its "
         "rates still change; check the control unit's gains, vanes and smoke limit"
     )
+
+
+def _check_stable(model: Model, y: Array) -> None:
+    """SolverError where the model swings about a steady state instead of resting there."""
+    growth = float(eigenvalues(0.0, y, model).real.max())
+    if growth > _GROWTH_PS:
+        raise SolverError(
+            f"the engine does not settle at {y[s.ENGINE] * 30 / np.pi:.0f} rpm: it swings about its steady state, "
+            f"growing by e in {1 / growth:.2g} s; lower the control unit's gains or lags"
+        )
 
 
 def _beginning(model: Model, engine_radps: float, road_mps: float, pedal: float) -> Array:
@@ -80,17 +97,19 @@ def _beginning(model: Model, engine_radps: float, road_mps: float, pedal: float)
     return y
 
 
-def _marched(model: Model, y: Array) -> Array:
+def _marched(model: Model, y: Array) -> tuple[Array, int]:
+    """The state some seconds later, and how many steps that took."""
     step = _STEP_S
     while step > longest_step_s(0.0, y, model) and step > 1e-6:
         step /= 2
-    y = march(0.0, y, step, 1, round(_MARCH_S / step), *TABLEAUX[4], model)[-1]
+    steps = round(_MARCH_S / step)
+    y = march(0.0, y, step, 1, steps, *TABLEAUX[4], model)[-1]
     if not np.isfinite(y).all():
         raise SolverError(
             "the engine's gas path does not settle: a volume ran empty or overflowed; check volumes, areas and "
             "pressure losses of its file"
         )
-    return y
+    return y, steps
 
 
 def _newton(model: Model, y: Array, free: list[int]) -> Array | None:

@@ -69,9 +69,13 @@ def help_of(architecture: Architecture, found: Paths, speed_mps: float) -> Helpe
     n = strongest(architecture, found, speed_mps)
     path = None if n is None else found.machines[n]
     if "e_boost" not in architecture.functions or path is None or n is None:
+        why = "no machine is joined to the wheels in this gear"
+        if "e_boost" not in architecture.functions:
+            why = "e_boost is none of this car's functions"
+        elif any(found.machines):
+            why = "in this gear and at this speed its machine would turn faster than it may"
         raise DataError(
-            f"{architecture.source}: e_boost is none of this car's functions, or no machine is joined in this "
-            "gear; choose a car whose machine may help, such as C2, or leave --e-boost out"
+            f"{architecture.source}: {why}; choose a car whose machine may help, such as C2, or leave --e-boost out"
         )
     machine, radius = architecture.machines[n], architecture.vehicle.tyre_radius_m
     top = machine.speed_max_radps if np.isfinite(machine.speed_max_radps) else _FASTEST_RADPS

@@ -80,13 +80,15 @@ def tip_in(manoeuvre: Manoeuvre, case: Case) -> TipIn:
     found = paths(architecture, manoeuvre.gear, manoeuvre.speed_mps)
     diesel = varied(manoeuvre.diesel, case)
     model = model_of(diesel, car_in_gear(architecture, diesel, found))
+    y = cruise(model, manoeuvre.speed_mps)
     helper = help_of(architecture, found, manoeuvre.speed_mps) if case.assist else None
     if helper is not None:
         model = assisted(model, helper)
-    y = cruise(model, manoeuvre.speed_mps)
     down = model._replace(drive=Drive(pedal_rate_ps=PEDAL_PER_S))
-    run = simulate(down, y, DURATION_S, step_s=manoeuvre.step_s, integrator=manoeuvre.integrator)
-    by_map = simulate(*_from_map(model, y), DURATION_S, step_s=manoeuvre.step_s)
+    run, by_map = (
+        simulate(m, begin, DURATION_S, step_s=manoeuvre.step_s, integrator=manoeuvre.integrator)
+        for m, begin in ((down, y), _from_map(model, y))
+    )
     helped = None if helper is None else helping(architecture, helper, run)
     return TipIn(case, run, by_map, figures_of(run, by_map), helped)
 

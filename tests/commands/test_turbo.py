@@ -49,6 +49,7 @@ def test_a_failed_case_is_said_and_makes_the_status_4(hevopt):
     [
         (["--step", "1"], "step 1 ms at t = 0 s is too long: gas, clutch or actuators need"),
         (["--step", "0.3"], "step 0.3 ms; allowed: 5 ms divided by a whole number"),
+        (["--step", "0.25", "--integrator", "lsoda"], "--step is of rk4; lsoda chooses its own"),
         (["--gear", "9"], "gear 9 of a tip-in; this car has gears 1 to 6"),
         (["--gear", "6", "--from", "20"], "the gear is too high for the speed, the engine would turn at 3"),
         (["--gear", "1", "--from", "120"], "the gear is too low for the speed"),

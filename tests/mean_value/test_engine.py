@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as draw
 from plain_engine import PlainCar
 
-from hevopt import DataError
+from hevopt import DataError, SolverError
 from hevopt.files.lookup import shipped_folder
 from hevopt.mean_value import states as s
 from hevopt.mean_value._run_kernels import TABLEAUX, march, observe, rates
@@ -322,8 +322,26 @@ def test_a_smoke_limit_that_no_steady_point_can_meet_is_one_message():
 
 
 @pytest.mark.parametrize(
-    ("gear", "kmh", "words"), [(4, 20.0, "too high"), (4, 250.0, "too low"), (5, 185.0, "needs")]
+    ("gear", "kmh", "words"),
+    [(4, 20.0, "too high"), (4, 250.0, "too low"), (5, 185.0, "needs"), (1, 40.0, "released")],
 )
 def test_a_speed_that_the_gear_does_not_fit_is_one_message(gear, kmh, words):
     with pytest.raises(DataError, match=f"{kmh:g} km/h.*{words}.*choose"):
         cruise(in_gear("compact_1300", gear), kmh / 3.6)
+
+
+def test_an_engine_that_is_slow_to_settle_settles_and_one_that_never_does_is_one_message():
+    model = bench()
+    control = model.control
+    slow = model._replace(
+        control=control._replace(boost_integral_ppas=control.boost_integral_ppas / 30)
+    )
+    y = steady_state(held(slow), 2000 * RPM)
+    usual = told(model, steady_state(held(model), 2000 * RPM))
+    assert told(slow, y)["p3_pa"] == pytest.approx(usual["p3_pa"], rel=1e-6)
+    wild = control._replace(boost_gain_ppa=100 * control.boost_gain_ppa, vanes_lag_s=1.0)
+    swinging = model._replace(control=wild)
+    with pytest.raises(
+        SolverError, match="does not settle at 2000 rpm: it swings about its steady state"
+    ):
+        steady_state(held(swinging), 2000 * RPM)

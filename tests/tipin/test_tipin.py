@@ -173,6 +173,14 @@ def test_a_car_without_boost_is_told_so():
         tip_in(manoeuvre("A"), Case("e-boost", assist=True))
 
 
+def test_a_machine_that_would_turn_too_fast_is_told_and_a_wrong_gear_first():
+    too_fast = load_architecture("D", {"machine.speed_max_rpm": 3000})
+    with pytest.raises(DataError, match="its machine would turn faster than it may"):
+        tip_in(Manoeuvre(too_fast, shipped("A").diesel, 60 / 3.6, 4), Case("e-boost", assist=True))
+    with pytest.raises(DataError, match="the gear is too low for the speed"):
+        tip_in(manoeuvre("C2", kmh=100.0, gear=1), Case("e-boost", assist=True))
+
+
 def test_a_case_that_fails_costs_no_other():
     found = tip_ins(
         manoeuvre(), [AS_SHIPPED, variation("final_drive", 1.5), variation("smoke", 9.0)]
