@@ -43,7 +43,7 @@ BACKENDS = [
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    return write_study(tmp_path_factory.mktemp("study"), 8, 8)
+    return write_study(tmp_path_factory.mktemp("study"), 8, 5)
 
 
 @pytest.fixture(scope="module")
