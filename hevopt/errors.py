@@ -6,10 +6,10 @@
     ├── InfeasibleError    3   nothing can follow the cycle, or keep the charge within its limits
     └── SolverError        3   a solver did not return what it promised
 
-A message says where, what was found, what is allowed and what to do next.
+Sweeps add WorkersLost, 4: their processes end faster than they work, or do not start.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -101,6 +101,20 @@ class SolverError(HevoptError):
     """A solver stopped without a usable answer."""
 
     exit_status = 3
+
+
+def close_to(
+    name: str,
+    known: Iterable[str],
+    meant: Sequence[str] = (),
+    *,
+    what: str = "close matches",
+    count: int = 3,
+    cutoff: float = 0.6,
+) -> str:
+    """The close matches of a name as the beginning of a hint, or nothing; meant: known ones also called so."""
+    close = dict.fromkeys([*get_close_matches(name, list(known), n=count, cutoff=cutoff), *meant])
+    return f"{what}: {', '.join(close)}; " if close else ""
 
 
 def unknown_name(kind: str, name: str, known: list[str], meant: Sequence[str] = ()) -> DataError:

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from hevopt.sweeps.plan.study_file import read_study
-from hevopt.sweeps.run import Execution, Watch, begin, plan_of, run_sweep
+from hevopt.sweeps.run import Execution, Onlookers, begin, plan_of, run_sweep
 from hevopt.sweeps.store.export import cases_csv
 from hevopt.sweeps.store.lock import locked
 from hevopt.sweeps.store.reading import open_to_read
@@ -47,7 +47,7 @@ def sweep_here(study, store, work="work", *, prune=False, retry_failed=False, wa
         plan = plan_of(read_study(study), prune=prune)
         begin(plan, opened, "test")
         execution = Execution(work=work if ":" in work else f"sweep_workers:{work}", **how)
-        options = {"prune": prune, "retry_failed": retry_failed, "watch": watch or Watch()}
+        options = {"prune": prune, "retry_failed": retry_failed, "watch": watch or Onlookers()}
         return run_sweep(plan, opened, execution, **options)
 
 

@@ -7,7 +7,7 @@ import time
 from zlib import crc32
 
 from hevopt.errors import SolverError
-from hevopt.sweeps.plan.jobs import Case, Failure, Job, Outcome
+from hevopt.sweeps.plan.jobs import Failure, Job, Result, Task
 
 
 def jobs(count, cases=2, does=None):
@@ -18,7 +18,7 @@ def jobs(count, cases=2, does=None):
         numbers = range(n * cases, (n + 1) * cases)
         acts = {f"k{i}": does[i] for i in numbers if i in does}
         made.append(
-            Job("car", {"does": acts}, "trace", False, tuple(Case(f"k{i}", 0.0, "dp") for i in numbers))
+            Job("car", {"does": acts}, "trace", False, tuple(Task(f"k{i}", 0.0, "dp") for i in numbers))
         )  # fmt: skip
     return made
 
@@ -38,9 +38,9 @@ def work(job, guard):
                 extra = act(job.changes.get("does", {}).get(case.key))
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
-            yield Outcome(case.key, "failed", None, Failure(text), 0.001)
+            yield Result(case.key, "failed", None, Failure(text), 0.001)
         else:
-            yield Outcome(case.key, "ok", row_of(case.key) | extra, None, 0.001)
+            yield Result(case.key, "ok", row_of(case.key) | extra, None, 0.001)
 
 
 def slow(job, guard):
@@ -62,7 +62,7 @@ def landscape(job, guard):
         }
         if case.strategy == "bound":
             row |= {"strategy": "bound", "objective_l_per_100km": None}
-        outcomes.append(Outcome(case.key, "ok", row, None, 0.001))
+        outcomes.append(Result(case.key, "ok", row, None, 0.001))
     return outcomes
 
 
@@ -81,22 +81,20 @@ def short_of_torque(job, guard):
 def typical(job, guard):
     """Rows as large as those of real cases."""
     more = {f"figure_number_{n}_l_per_100km": 1 / (n + 3) for n in range(15)}
-    return [Outcome(c.key, "ok", row_of(c.key) | more, None, 0.001) for c in job.cases]
+    return [Result(c.key, "ok", row_of(c.key) | more, None, 0.001) for c in job.cases]
 
 
 def bulky(job, guard):
     """Rows of six kilobytes, and time for the store to take them in several portions."""
     time.sleep(0.03)
-    return [
-        Outcome(c.key, "ok", row_of(c.key) | {"more": "x" * 6000}, None, 0.1) for c in job.cases
-    ]
+    return [Result(c.key, "ok", row_of(c.key) | {"more": "x" * 6000}, None, 0.1) for c in job.cases]
 
 
 def fails_when_asked(job, guard):
     """Every third key fails for as long as a file says so."""
     failing = os.path.exists(os.environ["SWEEP_FAILS"])
     return [
-        Outcome(o.key, "failed", None, Failure("asked to"), 0.0)
+        Result(o.key, "failed", None, Failure("asked to"), 0.0)
         if failing and crc32(o.key.encode()) % 3 == 0
         else o
         for o in work(job, guard)

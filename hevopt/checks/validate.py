@@ -1,7 +1,6 @@
 """`hevopt validate`: a file of any kind checked in full."""
 
 from collections.abc import Callable
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from hevopt.checks.files import (
     kind_and_contents,
 )
 from hevopt.checks.studies import compare_faults, sweep_faults
-from hevopt.errors import DataError, HevoptError
+from hevopt.errors import DataError, HevoptError, close_to
 from hevopt.files.lookup import find, grouped_names, is_path, meant_by, shipped_names
 from hevopt.files.shown import printable, shown
 
@@ -62,8 +61,7 @@ def _file(name: str) -> Path:
     if name in names:
         kind, suffix = names[name]
         return find(kind, name, suffix)
-    close = dict.fromkeys([*get_close_matches(name, names, n=3), *meant_by("cycles", name)])
-    hint = f"close matches: {', '.join(close)}; " if close else ""
+    hint = close_to(name, names, meant_by("cycles", name))
     raise DataError(
         f"{printable(name)}: no such file, and no shipped architecture, component or cycle has that name; {hint}"
         "give the path of a file or such a name"

@@ -24,7 +24,7 @@ _NAMED = ("nox_weight", "allow_shortfall", "free_gear", "refine", "horizon_s")
 
 
 @dataclass(frozen=True)
-class Job:
+class ComparisonJob:
     """Cars on a cycle, the settings that they are solved with, and the study file, if they come from one."""
 
     cars: "Cars"
@@ -86,7 +86,7 @@ class Files:
     _proven: list[tuple[str, Any, Any]] = field(default_factory=list, init=False)
     _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
 
-    def check(self, job: Job) -> None:
+    def check(self, job: ComparisonJob) -> None:
         """DataError, before anything is solved, where a file cannot be written, is an input, or is named twice, and
         for fronts of NOx where an engine has no data on it.
         """
@@ -135,7 +135,9 @@ class Files:
 
             self._driven.append((row, step_frame(case, trajectory)))
 
-    def write(self, job: Job, comparison: "Comparison") -> tuple[list[str], dict[str, HevoptError]]:
+    def write(
+        self, job: ComparisonJob, comparison: "Comparison"
+    ) -> tuple[list[str], dict[str, HevoptError]]:
         """Write all of them; a line for each, and the fronts and sensitivities that failed."""
         from hevopt.output import file_tables as outputs
 
@@ -156,7 +158,7 @@ class Files:
         return lines, failures
 
     def _write_page(
-        self, job: Job, comparison: "Comparison"
+        self, job: ComparisonJob, comparison: "Comparison"
     ) -> tuple[list[str], dict[str, HevoptError]]:
         if self._collector is None:
             return [], {}
@@ -175,7 +177,7 @@ class Files:
         return write_files(results, self.page, self.save), failures
 
 
-def show_rows(job: Job, comparison: "Comparison", *, wide: bool) -> None:
+def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> None:
     """Print the rows as a table with notes; wide: all columns, however narrow the terminal."""
     from hevopt.output import terminal_tables as report
 
@@ -187,7 +189,9 @@ def show_rows(job: Job, comparison: "Comparison", *, wide: bool) -> None:
     show_notes("\n".join([*notes, report.comparison_notes(comparison), *job.cars.said()]))
 
 
-def show_comparison(job: Job, comparison: "Comparison", *, json: bool, wide: bool) -> None:
+def show_comparison(
+    job: ComparisonJob, comparison: "Comparison", *, json: bool, wide: bool
+) -> None:
     """Print the rows as a table with notes and published figures, or as JSON."""
     from hevopt.output import file_tables as outputs
     from hevopt.output import terminal_tables as report

@@ -64,7 +64,7 @@ def compare(
     ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
-    from hevopt.commands.comparing import Files, Job, show_comparison
+    from hevopt.commands.comparing import ComparisonJob, Files, show_comparison
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies import comparison as study
@@ -77,7 +77,7 @@ def compare(
     below = {"set": {}} if study_path is None else read_study(study_path)
     asked = study_of(joined(below, given_of(_OPTIONS, options)))
     cars = cars_of(asked.architectures, asked.settings)
-    job = Job(cars, load_cycle(asked.cycle), asked.settings, study_path)
+    job = ComparisonJob(cars, load_cycle(asked.cycle), asked.settings, study_path)
     files = Files(out, steps, page, save, proofs, fronts, effects)
     files.check(job)
     compared = partial(study.compare_cars, cars.cars, settings=asked.settings)
@@ -113,7 +113,7 @@ def run(
     wide: WideOption = False,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
-    from hevopt.commands.comparing import Job, show_rows
+    from hevopt.commands.comparing import ComparisonJob, show_rows
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
@@ -128,7 +128,7 @@ def run(
 
     settings = study_of(given_of(_OPTIONS, given)).settings
     check_horizon(settings.horizon_s, [strategy])
-    job = Job(cars_of([architecture], settings), load_cycle(cycle), settings)
+    job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
     if out is not None:
         check_outs({"--out": out}, job.inputs)
@@ -171,7 +171,7 @@ def table(
     cycle: CycleOption = "nedc",
 ) -> None:
     """Write the control table of an architecture on a cycle, for other solvers."""
-    from hevopt.commands.comparing import Job
+    from hevopt.commands.comparing import ComparisonJob
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
     from hevopt.output.control_table import write_table
@@ -181,7 +181,7 @@ def table(
     from hevopt.studies.settings import given_of, study_of
 
     settings = study_of(given_of(_OPTIONS, given)).settings
-    job = Job(cars_of([architecture], settings), load_cycle(cycle), settings)
+    job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)
     car, trace = job.cars.cars[0], job.trace
     check_outs({"--out": out}, job.inputs)
     if settings.nox_weight > 0:

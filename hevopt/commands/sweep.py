@@ -14,7 +14,7 @@ from hevopt.files.shown import printable
 from hevopt.files.writing import note_written
 
 if TYPE_CHECKING:
-    from hevopt.sweeps.run import Execution, Plan
+    from hevopt.sweeps.run import Execution, Schedule
     from hevopt.sweeps.signals import Wish
 
 _FIRST_CASES = 5
@@ -95,7 +95,7 @@ def sweep(
 
     check_system()
     from hevopt.sweeps.into_store import check_sweep, into_store
-    from hevopt.sweeps.run import Execution, Stopped, Watch
+    from hevopt.sweeps.run import Execution, Onlookers, Stopped
     from hevopt.sweeps.signals import wish_to_end
 
     execution = Execution(backend, jobs, scheduler, timeout, memory_mb)
@@ -114,7 +114,7 @@ def sweep(
                 command_line(),
                 prune=prune,
                 retry_failed=retry_failed,
-                watch=Watch(progress, progress.say, wish, wish.held),
+                watch=Onlookers(progress, progress.say, wish, wish.held),
                 planning=progress.plan,
                 outs={"--export": export},
             )
@@ -171,7 +171,7 @@ def _rehearse(
     from hevopt.sweeps.into_store import NOTHING_TO_PRUNE
     from hevopt.sweeps.plan.designs import merged_values
     from hevopt.sweeps.plan.study_file import read_study
-    from hevopt.sweeps.run import Watch, plan_of, settled
+    from hevopt.sweeps.run import Onlookers, plan_of, settled
     from hevopt.sweeps.store.reading import open_to_read
     from hevopt.sweeps.workers.pools import cores
 
@@ -190,7 +190,9 @@ def _rehearse(
     if prune and not plan.prunable:
         write(NOTHING_TO_PRUNE)
     with wish.held():
-        sample = timed_sample(plan, keys - done, execution, Watch(notice=progress.say, stop=wish))
+        sample = timed_sample(
+            plan, keys - done, execution, Onlookers(notice=progress.say, stop=wish)
+        )
     if sample is None:
         write("nothing is left to run")
         return
@@ -203,7 +205,7 @@ def _rehearse(
     )
 
 
-def _say_plan(plan: "Plan", cases: int, done: int) -> None:
+def _say_plan(plan: "Schedule", cases: int, done: int) -> None:
     designs = plan.designs
     dropped = f", {designs.excluded} more excluded by constraints" if designs.excluded else ""
     twice = f", {designs.duplicates} more sampled twice" if designs.duplicates else ""

@@ -12,13 +12,13 @@ from hevopt.errors import InfeasibleError
 from hevopt.files.shown import printable
 
 if TYPE_CHECKING:
-    from hevopt.sweeps.run import Progress
+    from hevopt.sweeps.run import Advance
     from hevopt.sweeps.store.reading import Reader
 
 PARTLY = 4
 
 
-def end(store: Path, done: "Progress | None", export: Path | None) -> None:
+def end(store: Path, done: "Advance | None", export: Path | None) -> None:
     """Say what came of it; the exit status says it too."""
     from hevopt.sweeps.store.export import export as write_export
     from hevopt.sweeps.store.reading import open_to_read
@@ -51,7 +51,7 @@ def end(store: Path, done: "Progress | None", export: Path | None) -> None:
         raise typer.Exit(PARTLY)
 
 
-def _say_results(reader: "Reader", done: "Progress") -> None:
+def _say_results(reader: "Reader", done: "Advance") -> None:
     took_s = monotonic() - done.began_s
     pace = f", {done.done / took_s:.3g}/s" if done.done else ""
     write(f"{done.done} cases run in {duration(took_s)}{pace}; {done.failed} of them failed")

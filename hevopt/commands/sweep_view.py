@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich import progress as parts
     from rich.table import Table
 
-    from hevopt.sweeps.run import Progress
+    from hevopt.sweeps.run import Advance
     from hevopt.sweeps.store.ranking import Ranked
     from hevopt.sweeps.store.reading import Reader
     from hevopt.sweeps.store.reasons import Reason
@@ -35,7 +35,7 @@ class SweepProgress:
         self._said_s = monotonic()
         return self
 
-    def __call__(self, progress: "Progress") -> None:
+    def __call__(self, progress: "Advance") -> None:
         if self._console.is_terminal:
             self._draw(progress)
         elif monotonic() - self._said_s >= _LINE_EVERY_S:
@@ -55,7 +55,7 @@ class SweepProgress:
         else:
             self._console.print(f"hevopt: {text}", markup=False, highlight=False)
 
-    def _draw(self, progress: "Progress") -> None:
+    def _draw(self, progress: "Advance") -> None:
         from rich import progress as parts
 
         if self._bar is None:
@@ -81,7 +81,7 @@ class SweepProgress:
         self.finish()
 
 
-def _pace(progress: "Progress") -> str:
+def _pace(progress: "Advance") -> str:
     rate = progress.done / max(monotonic() - progress.began_s, 1e-9)
     left = duration((progress.total - progress.done) / rate) if rate else "time unknown"
     pruned = f", {progress.pruned} pruned" if progress.pruned else ""

@@ -10,7 +10,6 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from hevopt.display.axes import Panel, drawn_over_time, speed_panel
 from hevopt.display.facts import Shown
 from hevopt.driving.values import GRADE_MAX, Tell, check_range, check_time_and_speed, whole_numbers
-from hevopt.errors import DataError, Fault
+from hevopt.errors import DataError, Fault, close_to
 from hevopt.files.lookup import find, read_text, shipped_names
 from hevopt.files.shown import printable, shown
 from hevopt.units import TO_SI
@@ -212,8 +211,7 @@ def _rows(path: Path, text: str, tell: Tell) -> tuple[list[str], list[tuple[int,
 def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
     unknown = [cell for cell in cells if cell not in COLUMNS]
     if unknown:
-        close = get_close_matches(unknown[0].lower(), COLUMNS, n=2, cutoff=0.7)
-        hint = f"close matches: {', '.join(close)}; " if close else ""
+        hint = close_to(unknown[0].lower(), COLUMNS, count=2, cutoff=0.7)
         raise DataError(
             f"{path}, line {number}: unknown column {shown(unknown[0])}; {hint}"
             f"allowed: {', '.join(COLUMNS)}; {IMPORT}"

@@ -8,13 +8,12 @@ import json
 import re
 import stat
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hevopt.errors import DataError, unknown_name
+from hevopt.errors import DataError, close_to, unknown_name
 from hevopt.files.shown import encodable, printable, shown
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -156,18 +155,13 @@ def _file_at(
     if path.exists():
         raise DataError(f"{word} file {text} is not a regular file; give a {suffix} file or a name")
     there = _names_in((beside or Path()) / path.parent, suffix)
-    hint = _close("there with a close name", path.stem, filter(fits, there))
+    hint = close_to(path.stem, filter(fits, there), what="there with a close name")
     meant = meant_by(kind, path.stem)
     shipped = filter(fits, shipped_names(kind, suffix))
-    hint += _close("shipped with a close name", path.stem, shipped, meant)
+    hint += close_to(path.stem, shipped, meant, what="shipped with a close name")
     raise DataError(
         f"{word} file {text} does not exist; {hint}give the path of a {suffix} file or a name"
     )
-
-
-def _close(what: str, name: str, known: Iterable[str], meant: Sequence[str] = ()) -> str:
-    close = dict.fromkeys([*get_close_matches(name, known, n=3), *meant])
-    return f"{what}: {', '.join(close)}; " if close else ""
 
 
 def check_regular(path: Path) -> None:

@@ -4,7 +4,6 @@ import re
 import tomllib
 from collections.abc import Iterator
 from copy import deepcopy
-from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -12,7 +11,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic.fields import FieldInfo
 
-from hevopt.errors import DataError
+from hevopt.errors import DataError, close_to
 from hevopt.files.lookup import read_text
 from hevopt.files.shown import printable, shown
 
@@ -200,8 +199,7 @@ def _fault(model: type[BaseModel], fault: dict[str, Any]) -> str:
     place = ".".join(printable(str(part))[:80] for part in location)
     if kind == "extra_forbidden":
         known = list(_model_and_field(model, location[:-1])[0].model_fields)
-        close = get_close_matches(str(fault["loc"][-1]), known, n=2, cutoff=0.5)
-        hint = f"close matches: {', '.join(close)}; " if close else ""
+        hint = close_to(str(fault["loc"][-1]), known, count=2, cutoff=0.5)
         return f"unknown key {place}; {hint}allowed: {', '.join(known)}"
     if kind == "missing":
         return f"{place} is missing; add the key"
@@ -215,8 +213,7 @@ def _fault(model: type[BaseModel], fault: dict[str, Any]) -> str:
         return f"{place} = {shown(found)}; allowed: {_range(field)}"
     if kind == "literal_error" and isinstance(found, str):
         names = re.findall(r"'([^']*)'", fault["ctx"]["expected"])
-        close = get_close_matches(found, names, n=2, cutoff=0.5)
-        hint = f"close matches: {', '.join(close)}; " if close else ""
+        hint = close_to(found, names, count=2, cutoff=0.5)
         return f"{place} = {shown(found)}: {hint}allowed: {fault['ctx']['expected']}"
     context = {"place": place, **fault.get("ctx", {})}
     needed = _NEEDED.get(kind, fault["msg"].replace("{", "{{").replace("}", "}}"))

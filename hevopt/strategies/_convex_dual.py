@@ -21,7 +21,7 @@ from hevopt.problem.arrays import Array
 from hevopt.problem.battery import source_power_w
 from hevopt.problem.problem import Problem
 from hevopt.problem.switching import switching_of
-from hevopt.strategies._convex_parts import Cell, Hulls
+from hevopt.strategies._convex_parts import Cell, HullCorners
 
 # At the voltage's peak dr/dP has no end; any slope gives a tangent.
 _LEAST_ROOT = 1e-3
@@ -29,7 +29,7 @@ _LEAST_ROOT = 1e-3
 
 def dual_value_kg(
     problem: Problem,
-    hulls: Hulls,
+    hulls: HullCorners,
     cell: Cell,
     price_kgpj: Array,
     place_j: Array,
@@ -67,7 +67,7 @@ def dual_value_kg(
     return float(np.sum(np.minimum.reduceat(total, starts)) + ends_kg)
 
 
-def _best_slope(hulls: Hulls, cell: Cell, priced: Array, squared_v2: Array) -> Array:
+def _best_slope(hulls: HullCorners, cell: Cell, priced: Array, squared_v2: Array) -> Array:
     """(block,) dr/dP where cost + priced x r is least over a block's hull; at a kink, one that fits both sides.
 
     The best corner is an end of the best segment: dr/dP there, clipped to the slopes of the segments beside it.

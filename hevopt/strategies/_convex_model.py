@@ -21,7 +21,7 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import source_power_w
 from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_dual import dual_value_kg
-from hevopt.strategies._convex_parts import Cell, Hulls, cell_of
+from hevopt.strategies._convex_parts import Cell, HullCorners, cell_of
 
 SOLVER = "CLARABEL"
 # Segments kept for the solver: those whose slope lies within this share of the expected price, else every fourth.
@@ -51,7 +51,7 @@ class _Lines(NamedTuple):
 
 
 def optimum(
-    problem: Problem, hulls: Hulls, price_guess_kgpj: float, switch_j: Array | None = None
+    problem: Problem, hulls: HullCorners, price_guess_kgpj: float, switch_j: Array | None = None
 ) -> Solution:
     """The optimum of the convex model; the guess says where its hulls must be fine.
 
@@ -100,7 +100,7 @@ def optimum(
     return Solution(float(model.value) * unit_kg, bound, price, path)
 
 
-def _segments(hulls: Hulls, cell: Cell, price_kgpj: float) -> _Lines:
+def _segments(hulls: HullCorners, cell: Cell, price_kgpj: float) -> _Lines:
     """The segments the solver gets. Fewer lie below all of them: what it finds stays below the optimum."""
     block = hulls.block
     one_block = np.diff(block) == 0
@@ -122,7 +122,13 @@ def _segments(hulls: Hulls, cell: Cell, price_kgpj: float) -> _Lines:
 
 
 def _within_hulls(
-    hulls: Hulls, lines: _Lines, power: Any, cost: Any, share: Any, unit_w: float, unit_kg: float
+    hulls: HullCorners,
+    lines: _Lines,
+    power: Any,
+    cost: Any,
+    share: Any,
+    unit_w: float,
+    unit_kg: float,
 ) -> list[Any]:
     """Cost above every segment, power between the hull's ends, all in proportion to the share."""
     import cvxpy as cp

@@ -11,7 +11,7 @@ from hevopt.problem.problem import Problem
 from hevopt.strategies._convex_kernels import lower_hulls
 
 
-class Hulls(NamedTuple):
+class HullCorners(NamedTuple):
     """Corners of lower hulls as flat lists, block by block; a block is an open mode of a step.
 
     step, mode: (block,), steps rising; first: (block + 1,); cost_kg, power_w: (corner,); step_s: (time,)
@@ -45,7 +45,7 @@ class Cell(NamedTuple):
     high_j: float
 
 
-def hulls_of(choices: Choices, modes: Indices | None = None) -> Hulls:
+def hulls_of(choices: Choices, modes: Indices | None = None) -> HullCorners:
     """Hulls of every mode that is open at a step; with (time,) `modes`, of that mode alone."""
     first = choices.first
     if modes is not None:
@@ -56,7 +56,7 @@ def hulls_of(choices: Choices, modes: Indices | None = None) -> Hulls:
     counts = np.diff(hull_first, axis=1)
     step, column = np.nonzero(counts)
     ends = np.cumsum(counts[counts > 0])
-    return Hulls(
+    return HullCorners(
         step,
         column if modes is None else modes[step],
         np.concatenate([[0], ends]),

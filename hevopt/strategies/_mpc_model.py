@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Model(Shown):
+class PreviewModel(Shown):
     """Steps, controls and the feedback's two references.
 
     drain_j: (entry,) fall of stored energy at the start's state of charge
@@ -41,7 +41,7 @@ class Model(Shown):
     wanted_j: Array
 
 
-def model_of(problem: Problem, horizon_s: float) -> Model:
+def model_of(problem: Problem, horizon_s: float) -> PreviewModel:
     """The model of a problem under a preview of `horizon_s`."""
     choices, time_s = choices_of(problem), problem.table.time_s
     require_choices(problem, choices, "mpc")
@@ -54,7 +54,7 @@ def model_of(problem: Problem, horizon_s: float) -> Model:
     price = kernels.neutral_prices(hulls, *listed, end, _LEAST_PRICE_KGPJ)
     cheapest_j = drain_j[hulls.entry[hulls.first[:, 1] - 1]]
     returned_j = _recoverable_j(problem.table.signals, cheapest_j, end - 1)
-    return Model(choices, drain_j, fit, end, price, problem.end_min_j - returned_j)
+    return PreviewModel(choices, drain_j, fit, end, price, problem.end_min_j - returned_j)
 
 
 def _recoverable_j(signals: Signals | None, cheapest_j: Array, last: Indices) -> Array:

@@ -55,7 +55,7 @@ def follow(
     block_of: step -> first step of its block, and (step + 1, mode, node) values from there on
     """
     steps, budget = choices.steps, _MOVES_PER_STEP * choices.steps + 10_000
-    progress = kernels.Progress(
+    progress = kernels.Course(
         np.full(steps, -1), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64),
         np.zeros(len(choices.cost_kg), dtype=bool), np.zeros(3, dtype=np.int64),
     )  # fmt: skip

@@ -25,7 +25,7 @@ class Grid(NamedTuple):
     cell_j: float
 
 
-class Progress(NamedTuple):
+class Course(NamedTuple):
     """How far a rollout has come.
 
     path: (time,) entries; energy, mode: (time + 1,) before each step; closed: (entry,) dead ends
@@ -47,7 +47,7 @@ def _best_choice(
     grid: Grid,
     reach: Reach,
     battery: BatteryArrays,
-    progress: Progress,
+    progress: Course,
 ) -> tuple[int, int, float]:
     """Entry of least cost + switching + cost-to-go at step k, -1 where none is left; mode and energy after it.
 
@@ -97,7 +97,7 @@ def rollout(
     grid: Grid,
     reach: Reach,
     battery: BatteryArrays,
-    progress: Progress,
+    progress: Course,
     budget: int,
 ) -> None:
     """Go on along a value function until its last step, or back out of its first one, `begin`.

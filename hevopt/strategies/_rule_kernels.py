@@ -25,7 +25,7 @@ class Rule(NamedTuple):
     price_kgpj: float
 
 
-class Driven(NamedTuple):
+class RuleDrive(NamedTuple):
     """A drive under a rule: entries (time,) that were taken, and energy and mode (time + 1,) before each step."""
 
     entry: Indices
@@ -109,7 +109,7 @@ def _drive(
     begin: int,
     choices: Choices,
     battery: BatteryArrays,
-    driven: Driven,
+    driven: RuleDrive,
 ) -> float:
     """Drive on from a step with the engine's entries, (time,); the stored energy at the end."""
     power, step_s = choices.power_w, choices.step_s
@@ -125,8 +125,8 @@ def _drive(
 
 
 @compiled()
-def _at_rest(steps: int, start: State) -> Driven:
-    driven = Driven(
+def _at_rest(steps: int, start: State) -> RuleDrive:
+    driven = RuleDrive(
         np.empty(steps, dtype=np.int64), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64)
     )
     driven.energy_j[0], driven.mode[0] = start.energy_j, start.mode
@@ -141,7 +141,7 @@ def neutral_drive(
     start: State,
     end_j: float,
     battery: BatteryArrays,
-) -> tuple[Driven, Indices]:
+) -> tuple[RuleDrive, Indices]:
     """The drive whose charging power ends with end_j or just more, and the engine's entries in it, (time,).
 
     engine: (level, time) entries by rising charging power. The lowest level that reaches the charge is kept up to

@@ -190,7 +190,9 @@ def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
     return np.where(rules.standing, shifted[0], shifted)
 
 
-def _outcome(rules: Rules, rule: kernels.Rule, driven: kernels.Driven, engine: Indices) -> Outcome:
+def _outcome(
+    rules: Rules, rule: kernels.Rule, driven: kernels.RuleDrive, engine: Indices
+) -> Outcome:
     """What a drive under a rule with the engine's entries, (time,), comes to."""
     problem, choices = rules.problem, rules.choices
     control, energy_j = choices.control[driven.entry], driven.energy_j

@@ -54,7 +54,7 @@ _WORTH_ROUNDING = 1e-13
 _BESIDE_TOP = 1e-6
 
 
-class _Search:
+class _Rollouts:
     """Rollouts around trajectories of one problem, and the cheapest of them."""
 
     def __init__(self, problem: Problem) -> None:
@@ -91,7 +91,7 @@ class _Search:
 
 def solve(problem: Problem) -> Plan:
     """The cheapest rollout around the relaxation and the convex splits; its notes hold the relaxation's bound."""
-    search = _Search(problem)
+    search = _Rollouts(problem)
     guess = one_price_dual(problem)[-1].price_kgpj
     relaxation = optimum(problem, hulls_of(search.choices), guess)
     price_path = search.follow(relaxation)

@@ -26,7 +26,7 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, State
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _mpc_kernels as kernels
-from hevopt.strategies._mpc_model import Model, model_of
+from hevopt.strategies._mpc_model import PreviewModel, model_of
 from hevopt.strategies._mpc_qp import HorizonSolver, PreviewQp
 from hevopt.strategies._reach_kernels import reachable
 from hevopt.strategies.stepper import driven
@@ -47,7 +47,7 @@ _ENERGY_ROUNDING = 1e-12
 class Controller:
     """Decides step by step; it remembers the last QP's answer, and the mode and stored energy before the step."""
 
-    def __init__(self, problem: Problem, model: Model) -> None:
+    def __init__(self, problem: Problem, model: PreviewModel) -> None:
         self.problem, self.model = problem, model
         self.solver = HorizonSolver()
         self.mode, self.energy_j = problem.start_mode, problem.start_j

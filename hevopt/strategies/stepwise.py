@@ -50,10 +50,10 @@ def stepwise(problem: Problem, decide: Callable[[Step], int]) -> Plan:
 
     Raises InfeasibleError at the first step that leaves no usable control, DataError where the rule gives another.
     """
-    return Plan(driven(problem, Asked(problem, decide))[0])
+    return Plan(driven(problem, AskedRule(problem, decide))[0])
 
 
-class Asked:
+class AskedRule:
     """A rule as a stepper: it is shown each step, and what it chooses is checked."""
 
     def __init__(self, problem: Problem, rule: Callable[[Step], int]) -> None:

@@ -15,6 +15,7 @@ from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import dp
 from hevopt.studies.settings import Settings
+from hevopt.units import litres_per_100km
 
 # Levels are added until the cost moves by less than this share.
 _REFINED_ENOUGH = 2e-4
@@ -83,6 +84,11 @@ def prepare(
             break
         share /= 2
     return case
+
+
+def litres(car: Architecture, cycle: Cycle, fuel_kg: float) -> float:
+    """Fuel of a car on a cycle in l/100 km."""
+    return litres_per_100km(fuel_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
 
 
 def require_nox(car: Architecture, asking: str) -> None:

@@ -15,13 +15,12 @@ from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
 from hevopt.strategies import Strategy, chosen, strategy_named
 from hevopt.studies.cars import cars_of
-from hevopt.studies.case import prepare, require_nox
+from hevopt.studies.case import litres, prepare, require_nox
 from hevopt.studies.comparison import Progress, Strategies, unseen
 from hevopt.studies.pareto import GAP_ENOUGH, POINTS_MAX, SAME, Front, HalfPlane, front
 from hevopt.studies.rows import shortfall_steps
 from hevopt.studies.settings import Keywords, Settings, settings_from
 from hevopt.studies.solved import check_horizon
-from hevopt.units import litres_per_100km
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -189,9 +188,6 @@ def _problem(car: Architecture, cycle: Cycle, settings: Settings) -> Problem:
 def in_units(found: Front, car: Architecture, cycle: Cycle, strategy: str, short: int) -> CarFront:
     """A front in the units of a report. short: number of steps driven with less than the cycle asks"""
 
-    def litres(mass_kg: float) -> float:
-        return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
-
     def milligrams(mass_kg: float) -> float:
         return mass_kg * 1e6 / (cycle.distance_m / 1e3)
 
@@ -206,14 +202,16 @@ def in_units(found: Front, car: Architecture, cycle: Cycle, strategy: str, short
             CarPoint(
                 point.nox_weights,
                 strategy,
-                litres(point.fuel_kg),
+                litres(car, cycle, point.fuel_kg),
                 milligrams(point.nox_kg),
-                litres(plane.bound_kg),
+                litres(car, cycle, plane.bound_kg),
                 100 * max(excess_kg, 0.0) / plane.bound_kg if known else None,
                 str(plane.proof),
             )
         )
-    outer = tuple((milligrams(nox_kg), litres(fuel_kg)) for nox_kg, fuel_kg in _drawn(found))
+    outer = tuple(
+        (milligrams(nox_kg), litres(car, cycle, fuel_kg)) for nox_kg, fuel_kg in _drawn(found)
+    )
     return CarFront(car.name, cycle.name, tuple(points), outer, 100 * found.gap, short)
 
 

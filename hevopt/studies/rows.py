@@ -10,9 +10,8 @@ from hevopt.display.facts import Shown
 from hevopt.errors import HevoptError
 from hevopt.files.shown import printable
 from hevopt.problem.problem import Problem, Trajectory
-from hevopt.studies.case import Case
+from hevopt.studies.case import Case, litres
 from hevopt.studies.status import Mark, Status
-from hevopt.units import litres_per_100km
 
 NEUTRAL_PERCENT = 1.0
 REFERENCE_ARCHITECTURE = "A"
@@ -80,22 +79,19 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
     fuel_j = fuel_kg * car.engine.heating_value_jpkg
     bound_kg, proof = certificate.bound_of(trajectory)
 
-    def litres(mass_kg: float) -> float:
-        return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
-
     return Row(
         architecture=car.name,
         strategy=strategy,
         status=_status(problem, surplus_j, fuel_j),
-        fuel_l_per_100km=litres(fuel_kg),
+        fuel_l_per_100km=litres(car, cycle, fuel_kg),
         co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
         nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km if car.engine.nox_known else None,
         soc_start=problem.soc_start,
         soc_end=float(trajectory.soc[-1]),
         delta_energy_percent=_percent(surplus_j, fuel_j),
-        fuel_corrected_l_per_100km=litres(fuel_kg - certificate.price_kgpj * surplus_j),
+        fuel_corrected_l_per_100km=litres(car, cycle, fuel_kg - certificate.price_kgpj * surplus_j),
         engine_starts=engine_starts(problem, trajectory),
-        bound_l_per_100km=litres(bound_kg),
+        bound_l_per_100km=litres(car, cycle, bound_kg),
         gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
         certificate=Claim(proof),
         solve_s=solve_s,

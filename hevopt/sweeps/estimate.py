@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from time import monotonic
 
 from hevopt.sweeps.plan.jobs import Job
-from hevopt.sweeps.run import Execution, Plan, Stopped, Watch
+from hevopt.sweeps.run import Execution, Onlookers, Schedule, Stopped
 from hevopt.sweeps.workers.backends import workers
 
 _SAMPLES, _SAMPLE_WEIGHTS = 4, 3
@@ -25,7 +25,7 @@ class Sample:
 
 
 def timed_sample(
-    plan: Plan, missing: set[str], execution: Execution, watch: Watch
+    plan: Schedule, missing: set[str], execution: Execution, watch: Onlookers
 ) -> Sample | None:
     """A few jobs from all over the plan, run one after the other on one worker; None where none is missing.
 

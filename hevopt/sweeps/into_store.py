@@ -7,7 +7,7 @@ from hevopt.errors import DataError
 from hevopt.files.shown import shown
 from hevopt.files.writing import check_outs
 from hevopt.sweeps.plan.study_file import read_study
-from hevopt.sweeps.run import Execution, Plan, Progress, Watch, begin, plan_of, run_sweep
+from hevopt.sweeps.run import Advance, Execution, Onlookers, Schedule, begin, plan_of, run_sweep
 from hevopt.sweeps.store.lock import locked
 from hevopt.sweeps.store.reading import open_to_read
 from hevopt.sweeps.store.store import open_store
@@ -43,10 +43,10 @@ def into_store(
     *,
     prune: bool,
     retry_failed: bool,
-    watch: Watch,
+    watch: Onlookers,
     planning: Callable[[int, int], None] = lambda done, total: None,
     outs: Mapping[str, Path | None] | None = None,
-) -> Progress:
+) -> Advance:
     """Run what the store lacks of a study; how it went. Raises Stopped.
 
     command: what repeats it; planning: called with the number of cars checked and of all; outs: as above
@@ -67,7 +67,9 @@ def into_store(
                 )
 
 
-def _notices(plan: Plan, store: Path, others: int, known: bool, prune: bool, watch: Watch) -> None:
+def _notices(
+    plan: Schedule, store: Path, others: int, known: bool, prune: bool, watch: Onlookers
+) -> None:
     """What is to be known before the run. others: results of other plans; known: whether this one has some."""
     if prune and not plan.prunable:
         watch.notice(NOTHING_TO_PRUNE)

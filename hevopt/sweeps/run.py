@@ -40,7 +40,7 @@ class Execution:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class Schedule:
     """All cases of a study: jobs that run them, and which case answers for which design.
 
     inputs: file -> SHA-256, of all files that it is made from
@@ -69,7 +69,7 @@ class Plan:
 
 
 @dataclass(slots=True)
-class Progress:
+class Advance:
     """How far a sweep is. done: cases run since `began_s` (monotonic), failed: of those; total: to run."""
 
     total: int
@@ -80,13 +80,13 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Watch:
+class Onlookers:
     """Who looks on. progress: called some times a second; notice: what went wrong; stop: whether to end now.
 
     held: entered for the part of a sweep that asks `stop`
     """
 
-    progress: Callable[[Progress], None] = lambda progress: None
+    progress: Callable[[Advance], None] = lambda progress: None
     notice: Callable[[str], None] = lambda text: None
     stop: Callable[[], bool] = lambda: False
     held: Callable[[], AbstractContextManager[None]] = nullcontext
@@ -101,7 +101,7 @@ def plan_of(
     *,
     prune: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
-) -> Plan:
+) -> Schedule:
     """Every case of a study; DataError where a design is no car. prune: each design's bound is a case as well.
 
     progress: called with the number of cars on a cycle planned so far, and of all
@@ -127,10 +127,10 @@ def plan_of(
     inputs = files_digests(
         cars_of(study, designs), map(load_cycle, study.cycles), [study.source, *study.files]
     )
-    return Plan(study, designs, jobs, planned, inputs)
+    return Schedule(study, designs, jobs, planned, inputs)
 
 
-def begin(plan: Plan, store: Store, command: str) -> None:
+def begin(plan: Schedule, store: Store, command: str) -> None:
     """Make a plan the store's."""
     study = plan.study
     text = study.source.read_text(encoding="utf-8-sig")
@@ -152,21 +152,21 @@ def settled(endings: Mapping[str, str], *, retry_failed: bool) -> set[str]:
 
 
 def run_sweep(
-    plan: Plan,
+    plan: Schedule,
     store: Store,
     execution: Execution,
     *,
     prune: bool = False,
     retry_failed: bool = False,
-    watch: Watch,
-) -> Progress:
+    watch: Onlookers,
+) -> Advance:
     """Run what the store lacks of a plan that it has begun, and store it as it comes.
 
     What is stored does not depend on backend and workers, except for the seconds. Raises Stopped, or StoreGone.
     """
     done = settled(store.endings(), retry_failed=retry_failed)
     missing = {case.key for case in plan.planned} - done
-    progress = Progress(len(missing))
+    progress = Advance(len(missing))
     with ExitStack() as stack:
         team = workers(
             execution.terms(), backend=execution.backend, count=execution.workers,
@@ -187,12 +187,12 @@ def run_sweep(
 class _Course:
     """A sweep under way. workers: starts them at the first call; missing: keys of the cases still to run."""
 
-    plan: Plan
+    plan: Schedule
     store: Store
     workers: Callable[[], Run]
     missing: set[str]
-    progress: Progress
-    watch: Watch
+    progress: Advance
+    watch: Onlookers
 
     def run(self, keys: Iterable[str]) -> None:
         """Run those of some cases that are missing, and store what comes."""

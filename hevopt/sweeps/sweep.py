@@ -59,7 +59,7 @@ def sweep(
     """
     check_system()
     from hevopt.sweeps.into_store import check_sweep, into_store
-    from hevopt.sweeps.run import Execution, Progress, Watch
+    from hevopt.sweeps.run import Advance, Execution, Onlookers
 
     study, tell = Path(study), progress or (lambda text, done, total: None)
     place = study.with_suffix(".sqlite") if store is None else Path(store)
@@ -68,13 +68,13 @@ def sweep(
 
     last = (-1, 0)
 
-    def run(found: Progress) -> None:
+    def run(found: Advance) -> None:
         nonlocal last
         if (found.done, found.total) != last:
             last = found.done, found.total
             tell(f"{found.failed} failed, {found.pruned} pruned", *last)
 
-    watch = Watch(run, notice or (lambda text: None))
+    watch = Onlookers(run, notice or (lambda text: None))
     call = f"hevopt.sweep({str(study)!r}, {str(place)!r})"
     into_store(study, place, execution, call, prune=prune, retry_failed=retry_failed, watch=watch)
     with open_to_read(place) as reader:

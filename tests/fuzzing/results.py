@@ -43,7 +43,7 @@ def _saved() -> bytes:
 
 
 def _store() -> bytes:
-    from hevopt.sweeps.plan.jobs import Failure, Outcome
+    from hevopt.sweeps.plan.jobs import Failure, Result
     from hevopt.sweeps.plan.prune import Pruned
     from hevopt.sweeps.plan.study_file import read_study
     from hevopt.sweeps.run import begin, plan_of
@@ -60,7 +60,7 @@ def _store() -> bytes:
                 store.add(run_job(job))
             last = plan.jobs[-1]
             store.add(
-                [Outcome(last.cases[0].key, "failed", None, Failure("no such plan\nand why"), 1.0)]
+                [Result(last.cases[0].key, "failed", None, Failure("no such plan\nand why"), 1.0)]
             )
             keys = {case.key for case in last.cases}
             design = max(case.design for case in plan.planned if case.key in keys)

@@ -27,7 +27,7 @@ from sweep_runs import (
 )
 
 from hevopt.commands import sweep_view
-from hevopt.sweeps.run import Progress, Stopped
+from hevopt.sweeps.run import Advance, Stopped
 from hevopt.sweeps.store.lock import locked
 
 
@@ -315,7 +315,7 @@ def test_a_sweep_with_missing_cases_is_never_a_success(tmp_path, monkeypatch, ca
     def begin_and_forget(*_, **__):
         with sqlite3.connect(store) as connection:
             connection.execute("DELETE FROM cases WHERE key = (SELECT min(key) FROM cases)")
-        return Progress(8)
+        return Advance(8)
 
     monkeypatch.setattr("hevopt.sweeps.into_store.run_sweep", begin_and_forget)
     status, out, _ = called(monkeypatch, capsys, study)
@@ -327,7 +327,7 @@ def test_names_that_are_no_utf8_are_swept_stored_and_reported(tmp_path, monkeypa
     folder.mkdir()
     study = write_study(folder, 2, 2).rename(folder / os.fsdecode(b"c\xe9.toml"))
     sweep_here(study, study.with_suffix(".sqlite"), "work", workers=1)
-    monkeypatch.setattr("hevopt.sweeps.into_store.run_sweep", lambda *_, **__: Progress(0))
+    monkeypatch.setattr("hevopt.sweeps.into_store.run_sweep", lambda *_, **__: Advance(0))
     status, out, err = called(monkeypatch, capsys, study, "--export", folder / "cases.csv")
     assert (status, err) == (0, "") and "8 cases of 8 designs: 8 ok" in out
     store, page = study.with_suffix(".sqlite"), folder / "page.html"
@@ -362,7 +362,7 @@ def test_progress_is_a_line_every_ten_seconds_where_there_is_no_terminal(capsys,
     now = [100.0]
     monkeypatch.setattr(sweep_view, "monotonic", lambda: now[0])
     with sweep_view.SweepProgress() as shown:
-        progress = Progress(total=100, began_s=100.0)
+        progress = Advance(total=100, began_s=100.0)
         for second in range(25):
             now[0] = 100.0 + second
             progress.done, progress.failed = 2 * second, 1
@@ -377,9 +377,9 @@ def test_on_a_terminal_it_is_a_bar_with_the_same_figures():
     master, slave = pty.openpty()
     code = (
         "import time\nfrom hevopt.commands.sweep_view import SweepProgress\n"
-        "from hevopt.sweeps.run import Progress\n"
+        "from hevopt.sweeps.run import Advance\n"
         "with SweepProgress() as shown:\n"
-        "    p = Progress(total=10, began_s=time.monotonic() - 2)\n"
+        "    p = Advance(total=10, began_s=time.monotonic() - 2)\n"
         "    p.done, p.failed = 4, 1\n    shown(p)\n    shown.say('a worker was lost')\n"
     )
     done = subprocess.run(

@@ -18,7 +18,7 @@ from hevopt.errors import DataError
 from hevopt.sweeps.estimate import timed_sample
 from hevopt.sweeps.plan.prune import WAVES
 from hevopt.sweeps.plan.study_file import read_study
-from hevopt.sweeps.run import Execution, Stopped, Watch, plan_of
+from hevopt.sweeps.run import Execution, Onlookers, Stopped, plan_of
 from hevopt.sweeps.store.ranking import best_designs
 from hevopt.sweeps.store.reading import open_to_read
 from hevopt.sweeps.workers.work import run_job
@@ -80,7 +80,7 @@ def test_only_what_is_missing_is_run_and_failures_only_when_asked(tmp_path, monk
 def test_a_run_that_is_stopped_keeps_what_it_had_and_goes_on_from_there(tmp_path):
     study, store = write_study(tmp_path, 6, 10), tmp_path / "s.sqlite"
     seen = []
-    watch = Watch(progress=lambda p: seen.append(p.done), stop=lambda: seen[-1] >= 20)
+    watch = Onlookers(progress=lambda p: seen.append(p.done), stop=lambda: seen[-1] >= 20)
     with pytest.raises(Stopped):
         sweep_here(study, store, "slow", workers=2, watch=watch)
     assert 20 <= seen[-1] == stored(store) < 120
@@ -190,12 +190,12 @@ def test_pruning_bounds_alone_is_a_users_mistake(tmp_path):
 def test_the_sample_for_an_estimate_is_run_and_not_stored(tmp_path):
     plan = plan_of(read_study(write_study(tmp_path, 5, 4)))
     missing = {case.key for case in plan.planned}
-    sample = timed_sample(plan, missing, Execution(work="sweep_workers:work"), Watch())
+    sample = timed_sample(plan, missing, Execution(work="sweep_workers:work"), Onlookers())
     # Five jobs of two cases a millisecond each, out of twenty.
     assert sample.cases == 10 and sample.total_s == pytest.approx(20 * 0.002)
     # A worker's process imports numpy and numba before its first case.
     assert sample.startup_s > 0.1
-    assert timed_sample(plan, set(), Execution(), Watch()) is None
+    assert timed_sample(plan, set(), Execution(), Onlookers()) is None
 
 
 def test_of_many_nox_weights_the_sample_takes_a_few(tmp_path):
@@ -203,7 +203,7 @@ def test_of_many_nox_weights_the_sample_takes_a_few(tmp_path):
     study.write_text(study.read_text().replace("[0, 10]", "{ from = 0, to = 99, count = 100 }"))
     plan = plan_of(read_study(study))
     missing = {case.key for case in plan.planned}
-    sample = timed_sample(plan, missing, Execution(work="sweep_workers:work"), Watch())
+    sample = timed_sample(plan, missing, Execution(work="sweep_workers:work"), Onlookers())
     assert sample.cases == 5 * 3 and sample.total_s == pytest.approx(2000 * 0.001)
 
 
@@ -219,8 +219,8 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)
 MEMORY = """
 import re, sys
 from pathlib import Path
-from hevopt.sweeps.plan.jobs import Case, Job, Planned
-from hevopt.sweeps.run import Execution, Plan, Watch, run_sweep
+from hevopt.sweeps.plan.jobs import Task, Job, Planned
+from hevopt.sweeps.run import Execution, Schedule, Onlookers, run_sweep
 from hevopt.sweeps.store.store import open_store
 import sweep_workers
 
@@ -231,14 +231,14 @@ def peak_mb():
 count, before = int(sys.argv[2]), peak_mb()
 jobs, planned = [], []
 for n in range(count // 2):
-    cases = [Case(f"{m:064d}", 0.0, s) for m, s in ((2 * n, "dp"), (2 * n + 1, "ecms"))]
+    cases = [Task(f"{m:064d}", 0.0, s) for m, s in ((2 * n, "dp"), (2 * n + 1, "ecms"))]
     changes = {"battery.cells_in_series": n, "machine.power_max_w": 0.1 * n}
     jobs.append(Job("car", changes, "nedc", False, tuple(cases)))
     planned += [Planned(n, "nedc", case.strategy, 0.0, case.key) for case in cases]
 with open_store(Path(sys.argv[1])) as store:
     store.begin({}, ((n, {"a": n}) for n in range(count // 2)), planned)
     execution = Execution(work="sweep_workers:typical")
-    progress = run_sweep(Plan(None, None, jobs, planned), store, execution, watch=Watch())
+    progress = run_sweep(Schedule(None, None, jobs, planned), store, execution, watch=Onlookers())
 assert progress.done == count
 print(before, peak_mb())
 """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hevopt.car_files.engine import EngineFile
 from hevopt.errors import DataError
-from hevopt.measured.maps.grid import Axes, Grid, on_axes, torque_axis
+from hevopt.measured.maps.grid import Axes, MapGrid, on_axes, torque_axis
 from hevopt.measured.maps.limits import cell_at, encloses, near
 from hevopt.measured.maps.lines import Lines, envelope_nm
 from hevopt.measured.maps.points import Curve, EngineFacts, Points, above_zero, read_curve
@@ -107,7 +107,7 @@ def check_idle(idle_rpm: float, full: Curve) -> None:
         )
 
 
-def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> tuple[Grid, int]:
+def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> tuple[MapGrid, int]:
     """The grid of a flow from the motoring curve, where and below which it is 0, up to the full-load curve.
 
     Second, at how many of its speeds measured rows were continued up to that curve.
@@ -127,7 +127,9 @@ def flow_grid(lines: Lines, axes: Axes, motoring: Curve, full: Curve) -> tuple[G
     unfired = axis <= drag[:, None]
     # At a speed without any measurement nothing is known, and the 0 of the unfired engine would pass for it.
     measured = (~np.isnan(values) & ~unfired).any(axis=1, keepdims=True)
-    grid = Grid(speed, axis, np.where(unfired & measured, 0.0, np.where(measured, values, np.nan)))
+    grid = MapGrid(
+        speed, axis, np.where(unfired & measured, 0.0, np.where(measured, values, np.nan))
+    )
     return _up_to_full_load(grid, drag, lines, full) if lines.regular else (grid, 0)
 
 
@@ -139,7 +141,9 @@ def _fill_down_to(row: Array, axis: Array, least: float) -> None:
         row[gap] = np.interp(axis[gap], [least, axis[known[0]]], [0.0, row[known[0]]])
 
 
-def _up_to_full_load(grid: Grid, drag_nm: Array, lines: Lines, full: Curve) -> tuple[Grid, int]:
+def _up_to_full_load(
+    grid: MapGrid, drag_nm: Array, lines: Lines, full: Curve
+) -> tuple[MapGrid, int]:
     """The grid with corners of cells that the full-load curve cuts, each row continued linearly beyond its top.
 
     A rectangular cell needs them to be used up to the curve; beyond it the engine cannot go. Left out where the
@@ -158,7 +162,7 @@ def _up_to_full_load(grid: Grid, drag_nm: Array, lines: Lines, full: Curve) -> t
         beyond = slice(k + 1, cell_at(torque, wanted.max()) + 1)
         slope = (row[k] - row[j]) / (torque[k] - torque[j])
         row[beyond] = np.maximum(row[k] + slope * (torque[beyond] - torque[k]), 0.0)
-    return Grid(speed, torque, values), continued
+    return MapGrid(speed, torque, values), continued
 
 
 def _and_motoring(lines: Lines, motoring: Curve) -> Lines:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.machine import MachineFile
 from hevopt.display.facts import Shown
-from hevopt.measured.maps.grid import Grid
+from hevopt.measured.maps.grid import MapGrid
 from hevopt.measured.maps.request import ImportedMap
 from hevopt.units import RPM_PER_RADPS
 
@@ -53,7 +53,7 @@ def envelope_of(file: EngineFile | MachineFile, speed_radps: Array | None = None
     return Envelope(speed, -high, high)
 
 
-def between(grid: Grid, envelope: Envelope) -> tuple[Array, NDArray[np.bool_]]:
+def between(grid: MapGrid, envelope: Envelope) -> tuple[Array, NDArray[np.bool_]]:
     """(speed, share) torques evenly from the lowest to the highest at each speed, and which are known."""
     shares = np.linspace(0.0, 1.0, FINE)
     torque = envelope.low_nm[:, None] * (1 - shares) + envelope.high_nm[:, None] * shares
@@ -80,7 +80,7 @@ def in_reach(
     return above & (torque_nm <= envelope.high_nm + slack)
 
 
-def corners(grid: Grid, file: EngineFile | MachineFile) -> tuple[Array, Array]:
+def corners(grid: MapGrid, file: EngineFile | MachineFile) -> tuple[Array, Array]:
     """Speeds and torques, (place,), at which a map may be at its best: its cells in reach, and those of the limits.
 
     The limits at the grid's speeds and at the corners of the full-load curve.
@@ -97,7 +97,7 @@ def corners(grid: Grid, file: EngineFile | MachineFile) -> tuple[Array, Array]:
     return speeds[known], torques[known]
 
 
-def mesh(grid: Grid) -> tuple[Array, Array]:
+def mesh(grid: MapGrid) -> tuple[Array, Array]:
     """(speed, torque) speed and torque of every cell."""
     return np.meshgrid(grid.speed_radps, grid.torque_nm, indexing="ij")
 

@@ -7,7 +7,7 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.machine import MachineFile
 from hevopt.measured.maps.envelope import Envelope, in_reach, mesh, place
 from hevopt.measured.maps.gaps import WIDE, fired, widest_gap
-from hevopt.measured.maps.grid import Grid
+from hevopt.measured.maps.grid import MapGrid
 from hevopt.measured.maps.lines import Lines
 from hevopt.measured.maps.request import ImportedMap
 from hevopt.units import RPM_PER_RADPS
@@ -46,7 +46,7 @@ def faults(imported: ImportedMap, envelope: Envelope, what: str) -> list[str]:
     ]
 
 
-def _enclosed(grid: Grid) -> Array:
+def _enclosed(grid: MapGrid) -> Array:
     """(speed, torque) on how many of its four sides a cell has known ones: the car is driven amid those."""
     known, sides = ~np.isnan(grid.values), np.zeros(grid.values.shape)
     for axis in (0, 1):
@@ -64,7 +64,7 @@ def _listed(where: NDArray[np.bool_], speed: Array, torque: Array, weight: Array
     return f"{len(places)}: {'; '.join(places[:_LISTED])}{more}" if places else "none"
 
 
-def at_points(grid: Grid, lines: Lines, file: EngineFile | MachineFile, what: str) -> str:
+def at_points(grid: MapGrid, lines: Lines, file: EngineFile | MachineFile, what: str) -> str:
     """How far the grid is from the points behind it; at the drag, where fuel is cut, it is 0 by rule."""
     points, burning = lines.points, fired(lines)
     reached = in_reach(file, points.speed_radps, points.torque_nm)
@@ -92,7 +92,7 @@ def at_points(grid: Grid, lines: Lines, file: EngineFile | MachineFile, what: st
     )
 
 
-def _widest_gap(grid: Grid, lines: Lines, envelope: Envelope) -> list[str]:
+def _widest_gap(grid: MapGrid, lines: Lines, envelope: Envelope) -> list[str]:
     """Where the map leans on points that are furthest away, between the lowest and highest measured torque."""
     gap = widest_gap(lines, envelope)
     if gap is None:

@@ -32,7 +32,7 @@ _AXIS_MAX = 400
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Grid(Shown):
+class MapGrid(Shown):
     """A quantity on axes; values: (speed, torque), NaN where not measured."""
 
     speed_radps: Array
@@ -105,15 +105,15 @@ def torque_axis(low: float, high: float) -> Array:
     return np.concatenate([[low], inner, [high]])
 
 
-def on_axes(lines: Lines, speed_radps: Array, torque_nm: Array) -> Grid:
+def on_axes(lines: Lines, speed_radps: Array, torque_nm: Array) -> MapGrid:
     """The points on the axes: interpolated as the grid that they are, on whatever axes, else on triangles."""
     own = np.unique(lines.points.torque_nm)
     if lines.regular and len(own) > 1 and _share_torques(lines, own):
         values = np.full((len(lines.speed_radps), len(own)), np.nan)
         values[lines.line, np.searchsorted(own, lines.points.torque_nm)] = lines.points.value
-        grid = Grid(lines.speed_radps, own, values)
-        return Grid(speed_radps, torque_nm, grid.at(torque_nm, speed_radps[:, None]))
-    return Grid(speed_radps, torque_nm, _on_triangles(lines, speed_radps, torque_nm))
+        grid = MapGrid(lines.speed_radps, own, values)
+        return MapGrid(speed_radps, torque_nm, grid.at(torque_nm, speed_radps[:, None]))
+    return MapGrid(speed_radps, torque_nm, _on_triangles(lines, speed_radps, torque_nm))
 
 
 def _on_triangles(lines: Lines, speed_radps: Array, torque_nm: Array) -> Array:

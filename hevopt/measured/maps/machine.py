@@ -7,7 +7,7 @@ import numpy as np
 from hevopt.car_files.machine import MachineFile
 from hevopt.errors import DataError
 from hevopt.files.toml import checked
-from hevopt.measured.maps.grid import Grid, axes_of, on_axes
+from hevopt.measured.maps.grid import MapGrid, axes_of, on_axes
 from hevopt.measured.maps.limits import cell_at, near
 from hevopt.measured.maps.lines import in_lines
 from hevopt.measured.maps.points import Curve, EngineFacts, Points, read_curve, read_points
@@ -97,7 +97,7 @@ def import_machine(request: Request) -> ImportedMap:
     return ImportedMap(contents, file, origins, tuple(notes), _both_signs(grid), measured)
 
 
-def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
+def _within(grid: MapGrid, limit: Curve) -> tuple[MapGrid, list[str]]:
     """The grid without cells beyond a limit of torque over speed, but with the corners of those it cuts."""
     speed, torque = grid.speed_radps, grid.torque_nm
     values, known = grid.values.copy(), np.isfinite(grid.values)
@@ -106,7 +106,7 @@ def _within(grid: Grid, limit: Curve) -> tuple[Grid, list[str]]:
         top, low = torque[cell_at(torque, most)], -(-torque[::-1])[cell_at(-torque[::-1], most)]
         row[(torque > top) | (torque < low)] = np.nan
     gone = int((known & np.isnan(values)).sum())
-    return Grid(speed, torque, values), [
+    return MapGrid(speed, torque, values), [
         "full-load curve: torque is straight between its points, and power nowhere above that of all of them; "
         "torque_max_nm, power_max_w and speed_max_rpm are its largest torque, power and speed; "
         f"{gone} cells of the map wholly beyond it are left out"
@@ -133,12 +133,12 @@ def _check_generating(request: Request, points: Points) -> None:
         )
 
 
-def _both_signs(grid: Grid) -> Grid:
+def _both_signs(grid: MapGrid) -> MapGrid:
     torque, values = grid.torque_nm, grid.values
     if torque[0] < 0:
         return grid
     above = torque > 0
-    return Grid(
+    return MapGrid(
         grid.speed_radps,
         np.concatenate([-torque[above][::-1], torque]),
         np.hstack([values[:, above][:, ::-1], values]),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.maps.roles import VALUES_OF
-from hevopt.measured.maps.tables import Source, Table, curve_table, read_table
+from hevopt.measured.maps.tables import MapTable, Source, curve_table, read_table
 from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import columns_found
 from hevopt.units import RPM_PER_RADPS
@@ -146,7 +146,7 @@ def above_zero(full: Curve) -> Curve:
     )
 
 
-def _drag(table: Table, torque_nm: Array) -> tuple[Array, tuple[str, ...]]:
+def _drag(table: MapTable, torque_nm: Array) -> tuple[Array, tuple[str, ...]]:
     """The torque of the unfired engine below 0, and the notes; DataError where some rows brake and others drive."""
     turning = table.values["speed"] > 0
     driving, braking = turning & (torque_nm > 0), turning & (torque_nm < 0)
@@ -163,7 +163,7 @@ def _drag(table: Table, torque_nm: Array) -> tuple[Array, tuple[str, ...]]:
     return torque_nm, table.notes
 
 
-def _torque_nm(table: Table, role: str, facts: EngineFacts) -> Array:
+def _torque_nm(table: MapTable, role: str, facts: EngineFacts) -> Array:
     values, kind = table.values[role], table.kinds[role]
     if kind == "torque":
         return values
@@ -183,7 +183,7 @@ def _torque_nm(table: Table, role: str, facts: EngineFacts) -> Array:
     return values * facts.displacement_m3 / (4 * pi)
 
 
-def _value(table: Table, role: str, what: str, torque_nm: Array, facts: EngineFacts) -> Array:
+def _value(table: MapTable, role: str, what: str, torque_nm: Array, facts: EngineFacts) -> Array:
     """A value column as flow or loss, NaN where it says nothing."""
     values, kind = table.values[role], table.kinds[role]
     power_w = torque_nm * table.values["speed"]
@@ -212,7 +212,7 @@ def _value(table: Table, role: str, what: str, torque_nm: Array, facts: EngineFa
     return driving / efficiency / heat
 
 
-def _known(table: Table, value: float | None, what: str, key: str) -> float:
+def _known(table: MapTable, value: float | None, what: str, key: str) -> float:
     if value is None:
         raise DataError(
             f"{table.measured.path}: {what} needs {key} of the fuel measured (--like's may be another); give "
@@ -221,7 +221,7 @@ def _known(table: Table, value: float | None, what: str, key: str) -> float:
     return value
 
 
-def _check_values(table: Table, what: str, value: Array, torque_nm: Array) -> None:
+def _check_values(table: MapTable, what: str, value: Array, torque_nm: Array) -> None:
     """DataError, with lines, for what no bench measures."""
     speed = table.values["speed"]
     fired = (speed > 0) & (torque_nm > 0)
@@ -243,7 +243,7 @@ def _check_values(table: Table, what: str, value: Array, torque_nm: Array) -> No
             )
 
 
-def _left_out(table: Table, what: str, known: NDArray[np.bool_], powerless: NDArray[np.bool_]):
+def _left_out(table: MapTable, what: str, known: NDArray[np.bool_], powerless: NDArray[np.bool_]):
     empty = ~known & ~powerless
     if powerless.any():
         yield (
@@ -257,5 +257,5 @@ def _left_out(table: Table, what: str, known: NDArray[np.bool_], powerless: NDAr
         yield f"{what}: {empty.sum()} points not measured, {_places(table, empty)}: cells are empty"
 
 
-def _places(table: Table, where: NDArray[np.bool_]) -> str:
+def _places(table: MapTable, where: NDArray[np.bool_]) -> str:
     return runs(sorted(set(table.lines[where].tolist())))

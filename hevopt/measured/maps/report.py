@@ -10,7 +10,7 @@ from hevopt.car_files.machine import MachineFile
 from hevopt.measured.maps.envelope import FINE, Envelope, between, corners, envelope_of, place
 from hevopt.measured.maps.faults import at_points, faults
 from hevopt.measured.maps.gaps import lowest_fired_nm
-from hevopt.measured.maps.grid import Grid
+from hevopt.measured.maps.grid import MapGrid
 from hevopt.measured.maps.lines import Lines
 from hevopt.measured.maps.request import ImportedMap
 from hevopt.units import RPM_PER_RADPS
@@ -72,7 +72,7 @@ def _machine(imported: ImportedMap, file: MachineFile) -> list[str]:
     return said + faults(imported, envelope, "loss")
 
 
-def _extent(grid: Grid) -> str:
+def _extent(grid: MapGrid) -> str:
     rpm, torque = grid.speed_radps * RPM_PER_RADPS, grid.torque_nm
     return (
         f"grid: {len(rpm)} speeds, {rpm[0]:.4g} to {rpm[-1]:.4g} rpm; {len(torque)} torques, {torque[0]:.4g} "
@@ -80,14 +80,14 @@ def _extent(grid: Grid) -> str:
     )
 
 
-def _share(grid: Grid, envelope: Envelope, where: str) -> str:
+def _share(grid: MapGrid, envelope: Envelope, where: str) -> str:
     _, known = between(grid, envelope)
     height = (envelope.high_nm - envelope.low_nm)[:, None]
     share = (known * height).sum() / (height.sum() * FINE)
     return f"coverage: {share:.1%} of the area {where}; what the car asks for elsewhere is rejected"
 
 
-def _engine_share(grid: Grid, lines: Lines, envelope: Envelope) -> list[str]:
+def _engine_share(grid: MapGrid, lines: Lines, envelope: Envelope) -> list[str]:
     """Coverage by what was measured, what is assumed below it, and where the map ends below full load."""
     torque, known = between(grid, replace(envelope, low_nm=np.zeros_like(envelope.low_nm)))
     said = [
@@ -118,7 +118,7 @@ def _engine_share(grid: Grid, lines: Lines, envelope: Envelope) -> list[str]:
     return said
 
 
-def _shares(grid: Grid, lines: Lines, envelope: Envelope) -> str:
+def _shares(grid: MapGrid, lines: Lines, envelope: Envelope) -> str:
     """Shares of the area that were measured and that are assumed below the lowest measured torque."""
     torque, known = between(grid, replace(envelope, low_nm=np.zeros_like(envelope.low_nm)))
     lowest = lowest_fired_nm(lines, envelope.speed_radps)
@@ -179,7 +179,7 @@ def _above_full_load(lines: Lines, file: EngineFile) -> list[str]:
     ]
 
 
-def _idle(grid: Grid, lines: Lines, file: EngineFile) -> str:
+def _idle(grid: MapGrid, lines: Lines, file: EngineFile) -> str:
     flow, doubt = _at_idle(grid, lines, file)
     at = f"idle fuel ({file.idle_rpm:g} rpm, torque 0)"
     if np.isnan(flow):
@@ -190,7 +190,7 @@ def _idle(grid: Grid, lines: Lines, file: EngineFile) -> str:
     return f"{at}: {flow * 1e3:.4g} g/s, {litres:.3g} l/h{doubt}"
 
 
-def _idle_nox(grid: Grid, lines: Lines, file: EngineFile) -> str:
+def _idle_nox(grid: MapGrid, lines: Lines, file: EngineFile) -> str:
     flow, doubt = _at_idle(grid, lines, file)
     at = f"idle NOx ({file.idle_rpm:g} rpm, torque 0)"
     if np.isnan(flow):
@@ -201,7 +201,7 @@ def _idle_nox(grid: Grid, lines: Lines, file: EngineFile) -> str:
     return f"{at}: {flow * 1e6:.4g} mg/s{doubt}"
 
 
-def _at_idle(grid: Grid, lines: Lines, file: EngineFile) -> tuple[float, str]:
+def _at_idle(grid: MapGrid, lines: Lines, file: EngineFile) -> tuple[float, str]:
     """Flow at idle without torque, and what is doubtful about it."""
     idle_radps = np.array(file.idle_rpm / RPM_PER_RADPS)
     lowest = float(lowest_fired_nm(lines, idle_radps))

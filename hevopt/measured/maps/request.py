@@ -14,7 +14,7 @@ from hevopt.files.keypaths import with_changes
 from hevopt.files.lookup import find
 from hevopt.files.shown import shown
 from hevopt.files.toml import Model, read_toml
-from hevopt.measured.maps.grid import Grid
+from hevopt.measured.maps.grid import MapGrid
 from hevopt.measured.maps.lines import Lines
 from hevopt.measured.maps.tables import Source
 from hevopt.units import RPM_PER_RADPS
@@ -45,9 +45,9 @@ class ImportedMap:
     file: EngineFile | MachineFile
     origins: Mapping[str, str]
     notes: tuple[str, ...]
-    grid: Grid
+    grid: MapGrid
     lines: Lines
-    nox: tuple[Grid, Lines] | None = None
+    nox: tuple[MapGrid, Lines] | None = None
 
 
 def like_component(name: str | None, model: type[Model]) -> Model | None:

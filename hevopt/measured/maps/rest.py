@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.measured.maps.grid import Grid
+from hevopt.measured.maps.grid import MapGrid
 from hevopt.measured.maps.lines import Lines, groups
 from hevopt.units import RPM_PER_RADPS
 
@@ -54,7 +54,7 @@ def _loss_w(lines: Lines, group: NDArray[np.int64], k: int) -> float:
     return float(points.value[alike & (group == group[k])].mean())
 
 
-def with_rest(grid: Grid, assumed: bool) -> tuple[Grid, list[str]]:
+def with_rest(grid: MapGrid, assumed: bool) -> tuple[MapGrid, list[str]]:
     """The grid with standstill, where without torque nothing is lost, and notes.
 
     assumed: the loss at torque 0 is, and so are the cells up to the next torque
@@ -81,7 +81,7 @@ def with_rest(grid: Grid, assumed: bool) -> tuple[Grid, list[str]]:
     if assumed:
         for row in values[1:]:
             _fill_around(row, torque, zero)
-    return Grid(speed, torque, values), notes
+    return MapGrid(speed, torque, values), notes
 
 
 def _fill_around(row: Array, torque: Array, zero: int) -> None:

@@ -47,7 +47,7 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Table(Shown):
+class MapTable(Shown):
     """Rows of speed, torque and value columns, each (row,) in SI, by role.
 
     kinds, read: role -> quantity measured, and how its column was read
@@ -62,7 +62,7 @@ class Table(Shown):
     notes: tuple[str, ...]
 
 
-def read_table(source: Source, what: str) -> Table:
+def read_table(source: Source, what: str) -> MapTable:
     """Speed, torque and every column that can give "fuel", "nox" or "loss"."""
     measured, is_matlab = _read(source, points_table, source.columns, source.rows)
     names = [column.name for column in measured.columns]
@@ -77,7 +77,7 @@ def read_table(source: Source, what: str) -> Table:
     return _long(measured, source, columns)
 
 
-def curve_table(source: Source, role: str, *, plain: bool) -> Table | None:
+def curve_table(source: Source, role: str, *, plain: bool) -> MapTable | None:
     """Speed and torque of a curve; None where no column holds it. plain: one simply named torque will do."""
     measured, _ = _read(source, curves_table, source.columns, role)
     column = _column(measured, source, role)
@@ -121,7 +121,7 @@ def _needed(measured: Measured, source: Source, role: str) -> Column:
     return column
 
 
-def _long(measured: Measured, source: Source, columns: Mapping[str, Column | None]) -> Table:
+def _long(measured: Measured, source: Source, columns: Mapping[str, Column | None]) -> MapTable:
     values, kinds, read = {}, {}, {}
     for role, column in columns.items():
         if column is None:
@@ -139,10 +139,10 @@ def _long(measured: Measured, source: Source, columns: Mapping[str, Column | Non
                 "the rows"
             )
     notes = (*measured.notes, *read.values())
-    return Table(measured, values, kinds, read, measured.lines, False, notes)
+    return MapTable(measured, values, kinds, read, measured.lines, False, notes)
 
 
-def _grid(measured: Measured, source: Source, what: str) -> Table:
+def _grid(measured: Measured, source: Source, what: str) -> MapTable:
     """A grid as one row per cell; the axes' names and units from the corner, the options, or both."""
     down, across, units = _axes(measured, source)
     role = next((r for r in VALUES_OF[what] if r in source.units), VALUES_OF[what][0])
@@ -175,7 +175,7 @@ def _grid(measured: Measured, source: Source, what: str) -> Table:
             "a row per point"
         )
     notes = (*table.notes, f"grid: {rows} rows of {down}, {len(head)} columns of {across}")
-    return Table(measured, table.values, table.kinds, table.read, lines, True, notes)
+    return MapTable(measured, table.values, table.kinds, table.read, lines, True, notes)
 
 
 def _axes(measured: Measured, source: Source) -> tuple[str, str, dict[str, str | None]]:

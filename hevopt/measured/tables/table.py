@@ -6,14 +6,13 @@ units row, the name's suffix or the convention of a known tool; where none says 
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
-from hevopt.errors import DataError
+from hevopt.errors import DataError, close_to
 from hevopt.files.shown import printable, shown
 from hevopt.measured.tables.cells import Cells
 from hevopt.measured.tables.names import base_of, unit_by_convention, unit_in_name, units_in_name
@@ -214,8 +213,7 @@ def column_named(measured: Measured, name: str) -> Column:
             f"{measured.path}: {len(matches)} columns are named {shown(name)}; give one by its number, 1 to "
             f"{len(measured.columns)}"
         )
-    close = get_close_matches(name, [c.name for c in measured.columns], n=3, cutoff=0.5)
-    hint = f"close matches: {', '.join(close)}; " if close else ""
+    hint = close_to(name, [c.name for c in measured.columns], cutoff=0.5)
     raise DataError(f"{measured.path}: no column {shown(name)}; {hint}{columns_found(measured)}")
 
 

@@ -24,23 +24,22 @@ from hevopt.pages.comparison.operation import (
 from hevopt.pages.comparison.results import (
     CarFigures,
     Detail,
-    Member,
     PublishedFigure,
     Results,
-    Row,
     RowFigures,
-    Trace,
+    SavedMember,
+    SavedRow,
+    SavedTrace,
 )
 from hevopt.problem.problem import Plan, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.reproduction.published import published_beside
 from hevopt.strategies import STRATEGIES
-from hevopt.studies.case import Case
+from hevopt.studies.case import Case, litres
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.provenance import digests_shown, files_digests, versions
 from hevopt.studies.rows import Row as StudyRow
 from hevopt.studies.rows import is_neutral
-from hevopt.units import litres_per_100km
 
 # Decimals of traces: finer than any of them is known.
 _DIGITS = {
@@ -110,7 +109,7 @@ class Collector:
             + sorted(comparison.causal - STRATEGIES.keys()),
             cars=self._cars,
             rows=[
-                Row(
+                SavedRow(
                     figures=RowFigures.model_validate(row.as_dict()),
                     detail=self._details.get((row.architecture, row.strategy)),
                 )
@@ -176,18 +175,20 @@ def _detail(case: Case, plan: Plan, trajectory: Trajectory) -> Detail:
     )
 
 
-def _trace(case: Case, trajectory: Trajectory, operation: NDArray) -> Trace:
+def _trace(case: Case, trajectory: Trajectory, operation: NDArray) -> SavedTrace:
     table, flows = case.problem.table, trajectory.flows
     labels = [table.controls[c] for c in trajectory.control]
     listed = table.signals.gear.tolist()
-    values = {name: flows[name] for name in _DIGITS if name in flows and name in Trace.model_fields}
+    values = {
+        name: flows[name] for name in _DIGITS if name in flows and name in SavedTrace.model_fields
+    }
     values |= {
         "soc": trajectory.soc,
         "fuel_kg": trajectory.fuel_kg,
         "nox_kg": trajectory.nox_kg,
         "battery_power_w": trajectory.battery_power_w,
     }
-    return Trace(
+    return SavedTrace(
         operation=operation.tolist(),
         engine_gear=[label.engine_gear or gear for label, gear in zip(labels, listed, strict=True)],
         machine_gear=[label.machine_gear for label in labels],
@@ -195,21 +196,18 @@ def _trace(case: Case, trajectory: Trajectory, operation: NDArray) -> Trace:
     )
 
 
-def _calibration(case: Case, notes: Mapping[str, Any]) -> list[Member]:
+def _calibration(case: Case, notes: Mapping[str, Any]) -> list[SavedMember]:
     members: Sequence[Mapping[str, Any]] = notes.get("calibration", [])
     if len(members) < 2:
         return []
-    density, distance_m = case.car.engine.fuel_density_kgpm3, case.cycle.distance_m
+    distance_m = case.cycle.distance_m
     weight, engine = case.problem.nox_weight, case.car.engine
 
-    def litres(mass_kg: float) -> float:
-        return litres_per_100km(mass_kg, density, distance_m)
-
     return [
-        Member(
+        SavedMember(
             threshold_w=member["threshold_w"],
             nox_cap_kgps=member.get("nox_cap_kgps"),
-            corrected_l_per_100km=litres(member["corrected_kg"]),
+            corrected_l_per_100km=litres(case.car, case.cycle, member["corrected_kg"]),
             nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m if engine.nox_known else None,
             surplus_j=member["surplus_j"],
             neutral=bool(member["inside"])

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hevopt.pages.comparison.results import CarFigures, Results, Trace
+from hevopt.pages.comparison.results import CarFigures, Results, SavedTrace
 from hevopt.pages.comparison.saved import load_results
 from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row
@@ -48,7 +48,7 @@ def read_saved_steps(path: str | Path) -> "pd.DataFrame":
     return whole[[*_LEADING, *whole.columns.drop(list(_LEADING))]]
 
 
-def _steps_of(results: Results, car: CarFigures, trace: Trace) -> dict[str, Any]:
+def _steps_of(results: Results, car: CarFigures, trace: SavedTrace) -> dict[str, Any]:
     """Column name -> value of each step."""
     of_car = ("time_s", "step_s", "speed_mps", "wheel_power_w", "missing_torque_nm")
     driven = trace.model_dump(exclude={"soc", "operation"})

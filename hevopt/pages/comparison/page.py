@@ -5,7 +5,7 @@ from statistics import median
 from typing import Any
 
 from hevopt.pages.comparison.alerts import alerts
-from hevopt.pages.comparison.results import Item, Results, Row, Sensitivity
+from hevopt.pages.comparison.results import Item, Results, SavedRow, Sensitivity
 from hevopt.pages.comparison.verdict import best_rows, charge_asked, reference_row, verdict
 from hevopt.pages.render import render
 from hevopt.studies.rows import marked
@@ -30,7 +30,7 @@ def comparison_page(results: Results) -> str:
         charge_asked=charge_asked(results),
         table=[_figures(row) for row in results.rows],
         worth=[_worth(results, row) for row in results.rows if row.detail is not None],
-        energy=[_Balance.of(results, row) for row in results.rows if row.detail is not None],
+        energy=[_BalanceTable.of(results, row) for row in results.rows if row.detail is not None],
         spells=[_spells(row) for row in results.rows if row.detail is not None],
         chosen=_first_shown(results),
         effects=_effects(results),
@@ -56,7 +56,7 @@ def _left_out(results: Results) -> list[str]:
     return [text for text, found in options if not found]
 
 
-def _figures(row: Row) -> dict[str, Any]:
+def _figures(row: SavedRow) -> dict[str, Any]:
     """The row's figures, and what is derived from them for the table."""
     figures = row.figures
     derived: dict[str, Any] = {"co2_corrected_g_per_km": None, "delta_soc": None}
@@ -89,7 +89,7 @@ def _first_shown(results: Results) -> int:
     return next((n for n, row in enumerate(results.rows) if best and row.figures is best[0]), -1)
 
 
-def _worth(results: Results, row: Row) -> dict[str, Any]:
+def _worth(results: Results, row: SavedRow) -> dict[str, Any]:
     """What a joule in the battery is worth, and the price the strategy itself used; g/kWh and as efficiency."""
     car = results.cars[row.figures.architecture]
     own = row.detail.equivalence_kgpj
@@ -110,7 +110,7 @@ def _efficiency(price_kgpj: float, heating_value_jpkg: float) -> float | None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Balance:
+class _BalanceTable:
     """The energy balance of a row, ready to be printed: (name, kJ, MJ/km, per cent of what comes in)."""
 
     architecture: str
@@ -122,7 +122,7 @@ class _Balance:
     of_which: list[tuple[str, float, float, float]]
 
     @classmethod
-    def of(cls, results: Results, row: Row) -> "_Balance":
+    def of(cls, results: Results, row: SavedRow) -> "_BalanceTable":
         energy = row.detail.energy
         whole_j = sum(item.energy_j for item in energy.taken)
 
@@ -144,7 +144,7 @@ class _Balance:
         )
 
 
-def _spells(row: Row) -> dict[str, Any]:
+def _spells(row: SavedRow) -> dict[str, Any]:
     detail = row.detail
     return {
         "architecture": row.figures.architecture,

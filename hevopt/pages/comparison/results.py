@@ -84,7 +84,7 @@ class CarFigures(FileModel):
     machine: MapFigures
 
 
-class Trace(FileModel):
+class SavedTrace(FileModel):
     """What a row does, (time,), but soc: (time + 1,). operation: index into the names of `operations`."""
 
     soc: list[Number]
@@ -138,7 +138,7 @@ class Share(FileModel):
     nox_kg: Number | None
 
 
-class Member(FileModel):
+class SavedMember(FileModel):
     """One member of a rule family: thresholds, and what comes of them; NOx None where it is not known.
 
     neutral: keeps the SOC window, and its end charge is that asked within 1 % of the fuel's energy, as of rows
@@ -160,18 +160,18 @@ class Detail(FileModel):
     solver: what a solver reports as trouble
     """
 
-    trace: Trace
+    trace: SavedTrace
     energy: Energy
     shares: list[Share]
     limits: dict[str, Whole]
     engine_on_s: list[Number]
     engine_off_s: list[Number]
     equivalence_kgpj: Number | None
-    calibration: list[Member]
+    calibration: list[SavedMember]
     solver: list[str]
 
 
-class Row(FileModel):
+class SavedRow(FileModel):
     """A row with its detail; None where the case failed."""
 
     figures: RowFigures
@@ -257,7 +257,7 @@ class Results(FileModel):
     operations: list[str]
     causal: list[str]
     cars: dict[str, CarFigures]
-    rows: list[Row]
+    rows: list[SavedRow]
     failures: dict[str, str]
     lost_proofs: dict[str, str] = Field(default_factory=dict)
     published: list[PublishedFigure]

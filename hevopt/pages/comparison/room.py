@@ -5,7 +5,7 @@ of 20 000 steps and 65 rows takes 80 MB and 15 million numbers.
 """
 
 from hevopt.errors import DataError
-from hevopt.pages.comparison.results import CarFigures, Number, Trace
+from hevopt.pages.comparison.results import CarFigures, Number, SavedTrace
 
 # Unpacked.
 MEGABYTES_MAX = 200
@@ -28,7 +28,7 @@ def check_room(place: object, text: bytes, advice: str) -> None:
 
 def check_planned(steps: int, cars: int, rows: int) -> None:
     """DataError where so many cars and rows over so many steps cannot be saved."""
-    per_row = len(Trace.model_fields)
+    per_row = len(SavedTrace.model_fields)
     count = steps * (rows * per_row + cars * _PER_CAR)
     if count > _VALUES_MAX:
         most = max((_VALUES_MAX // steps - cars * _PER_CAR) // per_row, 0)

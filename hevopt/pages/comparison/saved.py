@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from hevopt.errors import DataError
 from hevopt.files.lookup import loaded_json, read_bytes
 from hevopt.files.shown import printable
-from hevopt.pages.comparison.results import FORMAT, CarFigures, Results, Row
+from hevopt.pages.comparison.results import FORMAT, CarFigures, Results, SavedRow
 from hevopt.pages.comparison.room import MEGABYTES_MAX, check_room
 
 _ADVICE = "give a file written by hevopt compare --save"
@@ -84,7 +84,7 @@ def _faults_of_car(name: str, car: CarFigures) -> list[str]:
     return faults
 
 
-def _faults_of_row(results: Results, row: Row) -> list[str]:
+def _faults_of_row(results: Results, row: SavedRow) -> list[str]:
     """Faults of a row that was solved, each after the row's place."""
     car, detail = results.cars.get(row.figures.architecture), row.detail
     if car is None:

@@ -7,7 +7,7 @@ from math import log
 import numpy as np
 
 from hevopt.pages.alert import Alert
-from hevopt.pages.sweep.data import Figures, Scalar, Sweep
+from hevopt.pages.sweep.data import DesignFigures, Scalar, Sweep
 from hevopt.pages.sweep.effects import is_log, is_numeric
 from hevopt.pages.sweep.verdict import GROUPS_MAX, Group, shown_value
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
@@ -139,7 +139,7 @@ def _by_weights(found: Iterable[tuple[str, str]]) -> list[str]:
     ]
 
 
-def _floors(figures: Figures, groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
+def _floors(figures: DesignFigures, groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
     """(weight, text): what the bounds of all designs together say about the best one."""
     for group in groups:
         bounds = figures.bound[group.members]
@@ -161,7 +161,7 @@ def _floors(figures: Figures, groups: Sequence[Group]) -> Iterator[tuple[str, st
         yield group.label, f"{text}{but}."
 
 
-def _ranges(figures: Figures, groups: Sequence[Group]) -> Alert:
+def _ranges(figures: DesignFigures, groups: Sequence[Group]) -> Alert:
     lines = _by_weights(
         (group.label, line)
         for group in groups

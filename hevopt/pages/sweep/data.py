@@ -50,7 +50,7 @@ class Solved(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Figures(Shown):
+class DesignFigures(Shown):
     """Designs in the order of their numbers; arrays and lists are (design,), NaN where there is nothing.
 
     objective, fuel, nox: means over the cycles of the best strategy's, fuel charge-corrected (l/100 km, mg/km)
@@ -119,7 +119,7 @@ class Sweep:
 
     name: str
     meta: Mapping[str, str]
-    figures: Figures
+    figures: DesignFigures
     tally: Tally
     pruned: Sequence[Pruned]
     cases_csv: bytes | None
@@ -151,7 +151,7 @@ def _meta_shown(meta: Mapping[str, str]) -> dict[str, str]:
     return {k: text if k in files else without_folders(text) for k, text in meta.items()}
 
 
-def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
+def summary_of(records: Iterable[Record]) -> tuple[DesignFigures, Tally]:
     """The figures of all designs, and how the cases ended, of the cases of a sweep in any order."""
     tally = Tally()
     designs: dict[int, tuple[Mapping[str, Scalar], float]] = {}
@@ -178,7 +178,7 @@ def summary_of(records: Iterable[Record]) -> tuple[Figures, Tally]:
     numbers, cycles = sorted(designs), list(tally.cycles)
     solved = [_mean_solved([best.get((n, cycle)) for cycle in cycles]) for n in numbers]
     held = [[_bound_of(best.get((n, c)), duals.get((n, c))) for c in cycles] for n in numbers]
-    figures = Figures(
+    figures = DesignFigures(
         number=np.array(numbers),
         values={key: [designs[n][0][key] for n in numbers] for key in _keys(designs)},
         weight=np.array([designs[n][1] for n in numbers]),
@@ -258,7 +258,7 @@ def _mean_solved(solved: Sequence[Solved | None]) -> _Mean:
     )
 
 
-def designs_csv(figures: Figures) -> bytes:
+def designs_csv(figures: DesignFigures) -> bytes:
     """A line per design, only the best ones, those that follow first, where there are more than DESIGNS_MAX."""
     merit = figures.merit
     order = np.arange(len(merit))

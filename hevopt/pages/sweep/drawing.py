@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car_files.meanings import MEANINGS
-from hevopt.pages.sweep.data import Array, Figures
-from hevopt.pages.sweep.effects import Effect, is_log, is_numeric
+from hevopt.pages.sweep.data import Array, DesignFigures
+from hevopt.pages.sweep.effects import ParameterEffect, is_log, is_numeric
 from hevopt.pages.sweep.front import Boundary, boundary, lines_boundary, pareto
 from hevopt.pages.sweep.verdict import Group, shown_value
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT
@@ -28,9 +28,9 @@ Indices = NDArray[np.intp]
 
 
 def drawn(
-    figures: Figures,
+    figures: DesignFigures,
     groups: Sequence[Group],
-    effects: Sequence[Sequence[Effect]],
+    effects: Sequence[Sequence[ParameterEffect]],
     plane: dict[str, Any] | None,
 ) -> dict[str, Any]:
     """Everything that the page's script draws. effects: of each group, the largest first"""
@@ -54,12 +54,12 @@ def unit_of(key: str) -> str:
     return next(iter(units)).replace("-", "") if len(units) == 1 else ""
 
 
-def merit_name(figures: Figures) -> str:
+def merit_name(figures: DesignFigures) -> str:
     return "objective" if np.isfinite(figures.objective).any() else "bound"
 
 
 def plane_of(
-    figures: Figures, groups: Sequence[Group], pruned: Sequence[Pruned] = ()
+    figures: DesignFigures, groups: Sequence[Group], pruned: Sequence[Pruned] = ()
 ) -> tuple[dict[str, Any] | None, list[str]]:
     """Fuel against NOx: points of each group, the front found and the certified boundary; and what they say.
 
@@ -86,11 +86,11 @@ def plane_of(
     return plane, [*words, *_unproven_words(figures, len(pruned))]
 
 
-def _following(figures: Figures, values: Array) -> Array:
+def _following(figures: DesignFigures, values: Array) -> Array:
     return np.where(figures.short, np.nan, values)
 
 
-def _pruned_places(figures: Figures, pruned: Sequence[Pruned]) -> dict[str, Any]:
+def _pruned_places(figures: DesignFigures, pruned: Sequence[Pruned]) -> dict[str, Any]:
     """Points of the edges of pruned designs' half planes, at the NOx of the designs that they lost to."""
     first = sorted(pruned, key=lambda p: (p.excess, p.design))[:POINTS_MAX]
     place = {int(number): n for n, number in enumerate(figures.number)}
@@ -107,7 +107,7 @@ def _pruned_places(figures: Figures, pruned: Sequence[Pruned]) -> dict[str, Any]
     }
 
 
-def _unproven_words(figures: Figures, pruned: int) -> list[str]:
+def _unproven_words(figures: DesignFigures, pruned: int) -> list[str]:
     """What designs that do not follow the cycle, and those pruned, do to the picture."""
     words = []
     if figures.short.any():
@@ -124,7 +124,9 @@ def _unproven_words(figures: Figures, pruned: int) -> list[str]:
     return words
 
 
-def _plane_words(figures: Figures, edge: Boundary | None, shown: int, solved: int) -> list[str]:
+def _plane_words(
+    figures: DesignFigures, edge: Boundary | None, shown: int, solved: int
+) -> list[str]:
     """What is proven about fuel and NOx, and what is not; which points are drawn."""
     bounded = np.isfinite(_following(figures, figures.bound))
     weights = np.unique(figures.weight[bounded])
@@ -174,11 +176,11 @@ def _rounded(values: NDArray[np.float64]) -> list[float | None]:
     return [None if np.isnan(value) else float(f"{value:.7g}") for value in values.tolist()]
 
 
-def _drawn(effects: Sequence[Effect]) -> list[dict[str, Any]]:
+def _drawn(effects: Sequence[ParameterEffect]) -> list[dict[str, Any]]:
     return [asdict(found) | {"unit": unit_of(found.key)} for found in effects[:EFFECTS_DRAWN]]
 
 
-def _parameter(key: str, figures: Figures) -> dict[str, Any]:
+def _parameter(key: str, figures: DesignFigures) -> dict[str, Any]:
     """What an axis needs to know of a parameter; texts stand in the order in which they first appear."""
     values = figures.values[key]
     numeric = is_numeric(values)
@@ -194,7 +196,7 @@ def _parameter(key: str, figures: Figures) -> dict[str, Any]:
     }
 
 
-def _lines(figures: Figures, group: Group) -> dict[str, Any]:
+def _lines(figures: DesignFigures, group: Group) -> dict[str, Any]:
     """The designs drawn as lines: all, or the best and of the others every so many-th by rank; the best last."""
     ranked = group.ranked[~figures.short[group.ranked]]
     if len(ranked) > LINES_MAX:
@@ -211,7 +213,7 @@ def _lines(figures: Figures, group: Group) -> dict[str, Any]:
     }
 
 
-def _column(key: str, figures: Figures, chosen: Indices) -> list[float]:
+def _column(key: str, figures: DesignFigures, chosen: Indices) -> list[float]:
     """Numbers of a parameter, or places of its texts among all of them."""
     values = figures.values[key]
     if is_numeric(values):
@@ -220,7 +222,7 @@ def _column(key: str, figures: Figures, chosen: Indices) -> list[float]:
     return [place[values[n]] for n in chosen.tolist()]
 
 
-def _places(figures: Figures, chosen: Indices) -> dict[str, Any]:
+def _places(figures: DesignFigures, chosen: Indices) -> dict[str, Any]:
     return {
         "design": figures.number[chosen].tolist(),
         "weight": figures.weight[chosen].tolist(),
@@ -230,7 +232,7 @@ def _places(figures: Figures, chosen: Indices) -> dict[str, Any]:
     }
 
 
-def _points(figures: Figures, groups: Sequence[Group], front: Indices) -> Indices:
+def _points(figures: DesignFigures, groups: Sequence[Group], front: Indices) -> Indices:
     """The designs drawn as points: all, or the best of each group in every cell, the listed and the front."""
     solved = np.flatnonzero(np.isfinite(figures.objective) & np.isfinite(figures.nox))
     if len(solved) <= POINTS_MAX:
@@ -248,7 +250,7 @@ def _points(figures: Figures, groups: Sequence[Group], front: Indices) -> Indice
     return np.unique(np.concatenate(kept))
 
 
-def _boundary(figures: Figures, least: float, most: float) -> Boundary | None:
+def _boundary(figures: DesignFigures, least: float, most: float) -> Boundary | None:
     """The certified boundary a little beyond the points' NOx, none of a car without a bound."""
     margin = _MARGIN * ((most - least) or most or 1.0)
     ends = (max(least - margin, 0.0), most + margin)

@@ -17,7 +17,7 @@ _LOG_SPAN = 20.0
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class ParameterEffect:
     """The objective over the values of one parameter; lists are (value or bin,), in ascending order.
 
     values: numbers (of a bin, its middle) or texts; low, high: ends of the bin, the value itself where it is none
@@ -55,7 +55,7 @@ def is_log(values: Sequence[float]) -> bool:
 
 def effect(
     key: str, values: Sequence[Any], objective: Array, pruned: Sequence[tuple[Any, float]] = ()
-) -> Effect:
+) -> ParameterEffect:
     """The effect of a parameter on the objective, both of one entry per design. pruned: others' value, bound"""
     solved = len(objective)
     values = [*values, *(value for value, _ in pruned)]
@@ -78,7 +78,7 @@ def effect(
     groups = [objective[place[:solved] == n] for n in used]
     floors = [whole[solved:][place[solved:] == n] for n in used]
     share, chance = (None, None) if pruned else _share(groups, objective)
-    return Effect(
+    return ParameterEffect(
         key, numeric, binned, log,
         *([of[n] for n in used] for of in (shown, low, high)),
         None if pruned else [float(group.mean()) for group in groups],

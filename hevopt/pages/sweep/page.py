@@ -14,7 +14,7 @@ from hevopt.files.lookup import places_shown
 from hevopt.files.shown import printable
 from hevopt.pages.render import render
 from hevopt.pages.sweep.alerts import alerts
-from hevopt.pages.sweep.data import CASES_MAX, DESIGNS_MAX, Figures, Sweep, designs_csv
+from hevopt.pages.sweep.data import CASES_MAX, DESIGNS_MAX, DesignFigures, Sweep, designs_csv
 from hevopt.pages.sweep.drawing import (
     BEST_LINES,
     BEST_LISTED,
@@ -25,7 +25,7 @@ from hevopt.pages.sweep.drawing import (
     plane_of,
     unit_of,
 )
-from hevopt.pages.sweep.effects import Effect, effect, is_log, is_numeric
+from hevopt.pages.sweep.effects import ParameterEffect, effect, is_log, is_numeric
 from hevopt.pages.sweep.verdict import Group, groups_of, shown_value, verdict
 from hevopt.studies.provenance import code_digest, versions
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending, Failure
@@ -118,7 +118,7 @@ def _number(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def _line(figures: Figures, n: int) -> dict[str, Any]:
+def _line(figures: DesignFigures, n: int) -> dict[str, Any]:
     """A design as a line of a table."""
     return {
         "design": int(figures.number[n]),
@@ -134,7 +134,7 @@ def _line(figures: Figures, n: int) -> dict[str, Any]:
     }
 
 
-def _values(figures: Figures, n: int) -> list[tuple[str, float | None]]:
+def _values(figures: DesignFigures, n: int) -> list[tuple[str, float | None]]:
     """Text of every parameter but the NOx weight, and its number where it is one."""
     found = [values[n] for key, values in figures.values.items() if key != NOX_WEIGHT]
     return [(shown_value(v), float(v) if is_numeric([v]) else None) for v in found]
@@ -173,7 +173,7 @@ def _failure(sweep: Sweep, record: Record) -> dict[str, Any]:
     }
 
 
-def _effects(sweep: Sweep, group: Group) -> list[Effect]:
+def _effects(sweep: Sweep, group: Group) -> list[ParameterEffect]:
     """Effects of the parameters that vary, the largest share first; none over weights that do not compare."""
     if group.weight is None:
         return []

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
-from hevopt.pages.sweep.data import Figures, Scalar, Sweep
+from hevopt.pages.sweep.data import DesignFigures, Scalar, Sweep
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending
 
 # More weights than this are not compared one by one.
@@ -33,7 +33,7 @@ class Group(Shown):
         return "all" if self.weight is None else f"{self.weight:g}"
 
 
-def groups_of(figures: Figures) -> list[Group]:
+def groups_of(figures: DesignFigures) -> list[Group]:
     """The designs of each NOx weight, by ascending weight; all as one where there are more than GROUPS_MAX."""
     weights = np.unique(figures.weight).tolist()
     merit = figures.merit
@@ -79,7 +79,7 @@ def verdict(sweep: Sweep, groups: Sequence[Group]) -> list[str]:
     ]
 
 
-def _best(figures: Figures, group: Group) -> str:
+def _best(figures: DesignFigures, group: Group) -> str:
     n = group.ranked[0]
     if group.weight is None:
         return (
@@ -108,7 +108,7 @@ def _best(figures: Figures, group: Group) -> str:
     return f"{text}, {above} above its proven bound"
 
 
-def _described(figures: Figures, n: int) -> str:
+def _described(figures: DesignFigures, n: int) -> str:
     values = [
         f"{key} {shown_value(of[n])}" for key, of in figures.values.items() if key != NOX_WEIGHT
     ]

@@ -22,7 +22,7 @@ BOUND = "bound"
 FIGURES = ("objective_l_per_100km", "objective_bound_l_per_100km")
 
 
-class Case(NamedTuple):
+class Task(NamedTuple):
     """A strategy under a NOx weight (kg fuel per kg NOx), and the key of its result."""
 
     key: str
@@ -53,7 +53,7 @@ class Job:
     changes: Mapping[str, Any]
     cycle: str
     allow_shortfall: bool
-    cases: tuple[Case, ...]
+    cases: tuple[Task, ...]
     inputs: str | None = None
     brought: Mapping[str, Brought] = field(default_factory=dict)
 
@@ -90,7 +90,7 @@ class Failure:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Result:
     """What came of a case. ending: one of SOLVED; failure: of one that has no row.
 
     row: the fields of rows.Row but solve_s; `objective_l_per_100km`: charge-corrected fuel + weighted NOx;
@@ -167,13 +167,13 @@ def jobs_of(
         for cycle in cycles:
             inputs = inputs_digest(car, traces[cycle])
             made_of = digest({**common, "inputs": inputs})
-            cases: dict[tuple[float, str], Case] = {}
+            cases: dict[tuple[float, str], Task] = {}
             planned = []
             for design, given in members:
                 weight = float(given)
                 for strategy in strategies:
                     key = digest([made_of, weight, strategy, *made_with.get(strategy, ())])
-                    cases[weight, strategy] = Case(key, weight, strategy)
+                    cases[weight, strategy] = Task(key, weight, strategy)
                     planned.append(Planned(design, cycle, strategy, weight, key))
             solved = tuple(cases.values())
             job = Job(architecture, changes, cycle, allow_shortfall, solved, inputs, own)

@@ -26,7 +26,7 @@ from typing import Any
 from hevopt.errors import DataError, HevoptError
 from hevopt.files.shown import encodable, printable
 from hevopt.files.writing import check_writable
-from hevopt.sweeps.plan.jobs import Outcome, Planned
+from hevopt.sweeps.plan.jobs import Planned, Result
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store.limits import check_side_files, schema_faults
 from hevopt.sweeps.store.stored import damaged, loaded
@@ -110,7 +110,7 @@ class Store:
                 self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             raise StoreGone(self.path)
 
-    def add(self, outcomes: Iterable[Outcome]) -> None:
+    def add(self, outcomes: Iterable[Result]) -> None:
         """Take outcomes, and commit them and earlier ones when it is time; called with none, only that."""
         for o in outcomes:
             if not self._waiting:

@@ -20,7 +20,7 @@ from loky.backend import resource_tracker as loky_tracker
 
 from hevopt.errors import HevoptError
 from hevopt.files.shown import first_line
-from hevopt.sweeps.plan.jobs import Job, Outcome
+from hevopt.sweeps.plan.jobs import Job, Result
 from hevopt.sweeps.workers.child import KEPT, Terms
 from hevopt.sweeps.workers.pools import Pool, open_pool
 from hevopt.sweeps.workers.supervisor import run_task
@@ -31,7 +31,7 @@ _CLOSE_S = 15.0
 # Pools that may end one after the other without a single outcome in between.
 _LOSSES_MAX = 5
 
-Run = Callable[[Iterable[Job]], Generator[list[Outcome], None, None]]
+Run = Callable[[Iterable[Job]], Generator[list[Result], None, None]]
 
 
 @contextmanager
@@ -89,7 +89,7 @@ class _Tasks:
         fitting = int(_TASK_S / self._job_s) if self._job_s else 1
         return max(1, min(fitting, share))
 
-    def answered(self, number: int, outcomes: list[Outcome]) -> None:
+    def answered(self, number: int, outcomes: list[Result]) -> None:
         jobs = self._sent.pop(number)
         took_s = max(sum(outcome.seconds for outcome in outcomes), 1e-4) / len(jobs)
         self._job_s = took_s if not self._job_s else 0.7 * self._job_s + 0.3 * took_s
@@ -143,7 +143,7 @@ class _Team:
         self._opened: Future[Any] | None = None
         self._losses, self._loss = 0, ""
 
-    def run(self, jobs: Iterable[Job]) -> Generator[list[Outcome], None, None]:
+    def run(self, jobs: Iterable[Job]) -> Generator[list[Result], None, None]:
         """Lists of outcomes, as `workers` says."""
         tasks = _Tasks(jobs)
         while (fault := (yield from self._attempt(tasks))) is not None:
@@ -153,7 +153,7 @@ class _Team:
             self._lost(fault)
             tasks.take_back()
 
-    def _attempt(self, tasks: _Tasks) -> Generator[list[Outcome], None, BaseException | None]:
+    def _attempt(self, tasks: _Tasks) -> Generator[list[Result], None, BaseException | None]:
         """Runs tasks until none is left, or one is lost: then why."""
         pool = yield from self._pool()
         sent: dict[Future[Any], int] = {}
@@ -164,7 +164,7 @@ class _Team:
                     sent[self._send(pool, *task)] = task[0]
                 if not sent:
                     break
-                outcomes: list[Outcome] = []
+                outcomes: list[Result] = []
                 for future in wait(sent, _TICK_S, FIRST_COMPLETED).done:
                     number = sent.pop(future)
                     if lost := _fault_of(future):
@@ -177,7 +177,7 @@ class _Team:
                 self._close()
         return fault
 
-    def _pool(self) -> Generator[list[Outcome], None, Pool]:
+    def _pool(self) -> Generator[list[Result], None, Pool]:
         if self._opened is None:
             self._opened = self._server.call(self._open)
         opened = self._opened
@@ -199,8 +199,8 @@ class _Team:
         return sent if fault else cast("Future[Any]", sent.result())
 
     def _answer(
-        self, tasks: _Tasks, number: int, answer: list[Outcome] | HevoptError
-    ) -> list[Outcome]:
+        self, tasks: _Tasks, number: int, answer: list[Result] | HevoptError
+    ) -> list[Result]:
         if isinstance(answer, HevoptError):
             raise answer
         tasks.answered(number, answer)
@@ -238,7 +238,7 @@ def _hear_signals() -> None:
                 signal.signal(number, handler)
 
 
-def _answer_of(terms: Terms, jobs: list[Job]) -> list[Outcome] | HevoptError:
+def _answer_of(terms: Terms, jobs: list[Job]) -> list[Result] | HevoptError:
     """What a worker returns; an error as a value, since each backend dresses up what is raised in its own way."""
     try:
         return run_task(jobs, terms)

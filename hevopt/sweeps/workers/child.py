@@ -20,12 +20,12 @@ from typing import Any
 
 from hevopt.errors import SolverError
 from hevopt.studies.provenance import code_digest
-from hevopt.sweeps.plan.jobs import SOLVED, Ending, Failure, Job, Outcome
+from hevopt.sweeps.plan.jobs import SOLVED, Ending, Failure, Job, Result
 
 READY, REFUSED, CASE, OUTCOME, DONE = "ready", "refused", "case", "outcome", "done"
 # For whatever ends a sweep before its end.
 KEPT = "all results so far are stored: the same command goes on from there"
-Work = Callable[..., Iterable[Outcome]]
+Work = Callable[..., Iterable[Result]]
 LOADING_WALL = 10.0
 # The kernel's prctl(2): a signal for this process when the one that started it ends.
 _PR_SET_PDEATHSIG = 1
@@ -75,7 +75,7 @@ def main() -> None:
             pipe.send((REFUSED, str(error) or type(error).__name__))
             return
         pipe.send((READY, None))
-        bench = _Bench(pipe, terms, work)
+        bench = _Runner(pipe, terms, work)
         while pipe.poll(_IDLE_S):
             bench.solve(pipe.recv())
             pipe.send((DONE, None))
@@ -118,7 +118,7 @@ def _address_space() -> int:
     return 0
 
 
-class _Bench:
+class _Runner:
     """Runs jobs, tells which case is next, and stops one that takes too long."""
 
     def __init__(self, pipe: Connection, terms: Terms, work: Work) -> None:
@@ -145,9 +145,9 @@ class _Bench:
         except BaseException as error:
             failure = Failure.of(error)
         for key in left:
-            self._send(Outcome(key, Ending.FAILED, None, failure, perf_counter() - began))
+            self._send(Result(key, Ending.FAILED, None, failure, perf_counter() - began))
 
-    def _send(self, outcome: Outcome) -> None:
+    def _send(self, outcome: Result) -> None:
         # Whatever the case made of the exception that was to stop it.
         if outcome.key in self._late:
             failure = Failure(late(self._terms.timeout_s))
@@ -188,7 +188,7 @@ def late(timeout_s: float | None) -> str:
     return f"timeout: took more than {timeout_s:g} s"
 
 
-def _storable(outcome: Outcome) -> Outcome:
+def _storable(outcome: Result) -> Result:
     try:
         if outcome.ending not in SOLVED:
             raise ValueError(f"a case cannot end as {outcome.ending!r}")
@@ -196,7 +196,7 @@ def _storable(outcome: Outcome) -> Outcome:
         return outcome
     except (TypeError, ValueError, RecursionError) as error:
         failure = Failure(f"the row cannot be stored: {error}")
-        return Outcome(outcome.key, Ending.FAILED, None, failure, outcome.seconds)
+        return Result(outcome.key, Ending.FAILED, None, failure, outcome.seconds)
 
 
 if __name__ == "__main__":

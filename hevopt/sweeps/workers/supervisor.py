@@ -18,7 +18,7 @@ from time import monotonic, sleep
 from typing import IO, NamedTuple
 from weakref import finalize
 
-from hevopt.sweeps.plan.jobs import Ending, Failure, Job, Outcome
+from hevopt.sweeps.plan.jobs import Ending, Failure, Job, Result
 from hevopt.sweeps.workers.child import (
     CASE,
     LOADING_WALL,
@@ -48,14 +48,14 @@ class Ended(NamedTuple):
     late: bool
 
 
-def run_task(jobs: Sequence[Job], terms: Terms) -> list[Outcome]:
+def run_task(jobs: Sequence[Job], terms: Terms) -> list[Result]:
     """The outcomes of all cases of some jobs."""
     return [outcome for job in jobs for outcome in _outcomes(job, terms)]
 
 
-def _outcomes(job: Job, terms: Terms) -> list[Outcome]:
+def _outcomes(job: Job, terms: Terms) -> list[Result]:
     """Outcomes of a job. A case during which the process ends is tried once more: it may not have been at fault."""
-    found: dict[str, Outcome] = {}
+    found: dict[str, Result] = {}
     suspects: set[str] = set()
     while left := tuple(case for case in job.cases if case.key not in found):
         began = monotonic()
@@ -67,7 +67,7 @@ def _outcomes(job: Job, terms: Terms) -> list[Outcome]:
             break
         if ended.late or key in suspects:
             fault = ended.fault if ended.late else f"{ended.fault}, twice"
-            found[key] = Outcome(key, Ending.FAILED, None, Failure(fault), monotonic() - began)
+            found[key] = Result(key, Ending.FAILED, None, Failure(fault), monotonic() - began)
         suspects.add(key)
     return list(found.values())
 
@@ -141,7 +141,7 @@ class _Process:
     def alive(self) -> bool:
         return self._running.poll() is None
 
-    def run(self, job: Job, found: dict[str, Outcome]) -> Ended | None:
+    def run(self, job: Job, found: dict[str, Result]) -> Ended | None:
         """Put the outcomes of a job among those found, as they come; how the process ended where it did."""
         self._errors.seek(0)
         self._errors.truncate()

@@ -20,7 +20,7 @@ from hevopt.problem.problem import Problem
 from hevopt.strategies import Strategy, brought
 from hevopt.strategies.brought import located
 from hevopt.studies.case import Case as SolvedCase
-from hevopt.studies.case import dp_case, require_nox
+from hevopt.studies.case import dp_case, litres, require_nox
 from hevopt.studies.rows import Row, shortfall_steps
 from hevopt.studies.solved import run_case
 from hevopt.studies.status import Status
@@ -28,14 +28,13 @@ from hevopt.sweeps.plan.brought import source_digest
 from hevopt.sweeps.plan.jobs import (
     BOUND,
     FIGURES,
-    Case,
     Ending,
     Failure,
     Job,
-    Outcome,
+    Result,
+    Task,
     inputs_digest,
 )
-from hevopt.units import litres_per_100km
 
 # Proofs that cost more than a design's solution are tried only above this gap, four times that of a comparison.
 _TARGET_GAP = 2e-3
@@ -43,7 +42,7 @@ _TARGET_GAP = 2e-3
 
 def run_job(
     job: Job, guard: Callable[[], AbstractContextManager[Any]] = nullcontext
-) -> Iterator[Outcome]:
+) -> Iterator[Result]:
     """An outcome for every case of a job, as it is there; any exception of a case is its outcome.
 
     guard: entered around every case, such as a time limit that raises
@@ -59,7 +58,7 @@ def run_job(
             ending, failure = Ending.INFEASIBLE, Failure.of(error)
         except Exception as error:
             ending, failure = Ending.FAILED, Failure.of(error)
-        yield Outcome(case.key, ending, row, failure, perf_counter() - began)
+        yield Result(case.key, ending, row, failure, perf_counter() - began)
 
 
 class _Bench:
@@ -71,7 +70,7 @@ class _Bench:
         self._solved: dict[float, SolvedCase] = {}
         self._brought: dict[str, Strategy] = {}
 
-    def row(self, case: Case) -> dict[str, Any]:
+    def row(self, case: Task) -> dict[str, Any]:
         """A case's row as an outcome holds it."""
         if self._built is None:
             car, cycle = (
@@ -116,7 +115,7 @@ def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, A
         car.name,
         BOUND,
         Status(shortfall_steps=shortfall_steps(problem)),
-        bound_l_per_100km=_litres(car, cycle, bound_kg),
+        bound_l_per_100km=litres(car, cycle, bound_kg),
         certificate=Claim(proof),
     )
     return _stored(row, None, row.bound_l_per_100km)
@@ -130,7 +129,7 @@ def _strategy_row(
     worth_kg = solved.certificate.price_kgpj * surplus_j
     bound_kg, _ = solved.certificate.bound_of(trajectory)
     objective, bound = (
-        _litres(solved.car, solved.cycle, mass_kg - worth_kg)
+        litres(solved.car, solved.cycle, mass_kg - worth_kg)
         for mass_kg in (trajectory.cost_kg, bound_kg)
     )
     stored, lost = _stored(row, objective, bound), solved.certificate.failures
@@ -145,10 +144,6 @@ def _stored(row: Row, objective: float | None, bound: float | None) -> dict[str,
     if any(isinstance(value, float) and not isfinite(value) for value in values.values()):
         raise SolverError("a figure is not finite; the design is too far from a car")
     return values
-
-
-def _litres(car: Architecture, cycle: Cycle, mass_kg: float) -> float:
-    return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
 
 
 def _cycle(name: str) -> Cycle:

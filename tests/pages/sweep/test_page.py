@@ -27,7 +27,7 @@ from hevopt.pages.sweep.front import boundary, lines_boundary, pareto
 from hevopt.pages.sweep.page import sweep_page, unit_of
 from hevopt.pages.sweep.verdict import groups_of, verdict
 from hevopt.studies.rows import Row
-from hevopt.sweeps.plan.jobs import FIGURES, Ending, Failure, Outcome, Planned
+from hevopt.sweeps.plan.jobs import FIGURES, Ending, Failure, Planned, Result
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.plan.study_file import read_study
 from hevopt.sweeps.run import begin, plan_of
@@ -527,7 +527,7 @@ def test_names_and_errors_from_files_stay_text(opened, tmp_path):
         row = row_of(4.0 + n, 100.0, 0.0, strategy=evil) if n < 6 else None
         planned.append(Planned(n, evil, evil, 0.0, str(n)))
         ending, failure = ("ok", None) if row else ("failed", Failure(evil))
-        outcomes.append(Outcome(str(n), ending, row, failure, 0.1))
+        outcomes.append(Result(str(n), ending, row, failure, 0.1))
     with open_store(path) as store:
         designs = [(n, {"engine": f"{evil}{n % 2}", f"x.{evil}": n}) for n in range(9)]
         store.begin(

@@ -8,7 +8,7 @@ from small_stores import DESIGNS, PLAN, ok
 from sweep_runs import table
 
 import hevopt
-from hevopt.sweeps.plan.jobs import Failure, Outcome
+from hevopt.sweeps.plan.jobs import Failure, Result
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store import frames
 from hevopt.sweeps.store.export import cases_csv
@@ -23,7 +23,7 @@ def path(tmp_path):
     path = tmp_path / "s.sqlite"
     with open_store(path) as store:
         store.begin({"study": ""}, designs, PLAN)
-        store.add([ok("0dp"), Outcome("0ecms", "failed", None, Failure("no plan"), 0.25)])
+        store.add([ok("0dp"), Result("0ecms", "failed", None, Failure("no plan"), 0.25)])
         store.prune([Pruned(1, 3.5, 0, 3.0)])
     return path
 

@@ -15,7 +15,7 @@ from hevopt.errors import DataError, HevoptError
 from hevopt.pages.sweep.alerts import alerts
 from hevopt.pages.sweep.data import load_sweep
 from hevopt.pages.sweep.verdict import groups_of
-from hevopt.sweeps.plan.jobs import Failure, Outcome
+from hevopt.sweeps.plan.jobs import Failure, Result
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store import store as store_module
 from hevopt.sweeps.store.lock import locked
@@ -36,8 +36,8 @@ def records(path):
 
 
 def test_what_is_stored_is_read_to_the_last_bit_in_the_order_of_designs(tmp_path):
-    failed = Outcome("1dp", "failed", None, Failure("no; 'quoted'\n"), 2.0)
-    infeasible = Outcome("1ecms", "infeasible", None, Failure("never"), 1.0)
+    failed = Result("1dp", "failed", None, Failure("no; 'quoted'\n"), 2.0)
+    infeasible = Result("1ecms", "infeasible", None, Failure("never"), 1.0)
     path = filled(tmp_path / "s.sqlite", [failed, ok("0ecms", 0.1 + 0.2), infeasible])
     found = records(path)
     assert [(r.design, r.strategy, r.ending) for r in found] == [
@@ -54,8 +54,8 @@ def test_a_failure_is_read_as_it_was_made_and_a_lost_proof_is_in_every_view(tmp_
     why = Failure.of(DataError("cycle cannot be followed:\n  t = 3 s\nchoose another"))
     lost = {"lost_proofs": {"LP prices": "HiGHS stopped with status 4"}}
     fine = ok("0dp")
-    solved = Outcome(fine.key, fine.ending, fine.row | lost, None, 0.5)
-    filled(path, [solved, Outcome("1dp", "failed", None, why, 1.0)])
+    solved = Result(fine.key, fine.ending, fine.row | lost, None, 0.5)
+    filled(path, [solved, Result("1dp", "failed", None, why, 1.0)])
     found = {(r.design, r.strategy): r for r in records(path)}
     assert found[1, "dp"].failure == why
     assert (why.headline, why.details) == (
@@ -80,10 +80,10 @@ def page_alerts(path):
 
 def test_a_result_is_never_replaced_and_a_failure_is(tmp_path):
     path = filled(
-        tmp_path / "s.sqlite", [ok("0dp", 1.0), Outcome("1dp", "failed", None, Failure("e"), 0.0)]
+        tmp_path / "s.sqlite", [ok("0dp", 1.0), Result("1dp", "failed", None, Failure("e"), 0.0)]
     )
     filled(
-        path, [ok("0dp", 2.0), ok("1dp", 3.0), Outcome("0dp", "failed", None, Failure("late"), 0.0)]
+        path, [ok("0dp", 2.0), ok("1dp", 3.0), Result("0dp", "failed", None, Failure("late"), 0.0)]
     )
     found = {r.design: r for r in records(path) if r.strategy == "dp"}
     assert found[0].row["fuel_l_per_100km"] == 1.0 and found[1].row["fuel_l_per_100km"] == 3.0

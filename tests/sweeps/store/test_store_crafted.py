@@ -10,7 +10,7 @@ from small_stores import DESIGNS, PLAN, ok, row
 from hevopt.errors import DataError
 from hevopt.pages.sweep.data import load_sweep
 from hevopt.pages.sweep.page import sweep_page
-from hevopt.sweeps.plan.jobs import Failure, Outcome, Planned
+from hevopt.sweeps.plan.jobs import Failure, Planned, Result
 from hevopt.sweeps.plan.prune import Pruned
 from hevopt.sweeps.store import limits
 from hevopt.sweeps.store.export import cases_csv
@@ -30,7 +30,7 @@ def store(tmp_path):
     path = tmp_path / "s.sqlite"
     with open_store(path) as opened:
         opened.begin({"study": "text", "inputs": "{}", "versions": "{}"}, DESIGNS, PLAN)
-        opened.add([ok("0dp"), Outcome("0ecms", "failed", None, Failure("no"), 1.0)])
+        opened.add([ok("0dp"), Result("0ecms", "failed", None, Failure("no"), 1.0)])
         opened.prune([Pruned(1, 2.0, 0, 1.5)])
     return path
 
@@ -168,7 +168,7 @@ def test_files_are_named_without_folders_that_are_the_users(tmp_path):
     with open_store(path) as opened:
         opened.begin(meta, designs, plan)
         opened.add(
-            [ok("0dp"), Outcome("1dp", "failed", None, Failure(f"{folder}/short.csv: no"), 1.0)]
+            [ok("0dp"), Result("1dp", "failed", None, Failure(f"{folder}/short.csv: no"), 1.0)]
         )
     page = read_all(path)
     with open_to_read(path) as reader:

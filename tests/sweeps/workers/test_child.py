@@ -6,8 +6,8 @@ import time
 import pytest
 from sweep_workers import jobs
 
-from hevopt.sweeps.plan.jobs import Ending, Outcome
-from hevopt.sweeps.workers.child import OUTCOME, Terms, _Bench
+from hevopt.sweeps.plan.jobs import Ending, Result
+from hevopt.sweeps.workers.child import OUTCOME, Terms, _Runner
 
 
 def sleeps(key):
@@ -32,12 +32,12 @@ def endings(does, *, loading_s, cases=2):
         for case in job.cases:
             with guard():
                 does(case.key)
-            yield Outcome(case.key, Ending.OK, {}, None, 0.0)
+            yield Result(case.key, Ending.OK, {}, None, 0.0)
 
     before = signal.getsignal(signal.SIGALRM)
     try:
         (job,) = jobs(1, cases)
-        _Bench(Pipe, Terms("-", timeout_s=0.02, loading_s=loading_s), work).solve(job)
+        _Runner(Pipe, Terms("-", timeout_s=0.02, loading_s=loading_s), work).solve(job)
     finally:
         signal.signal(signal.SIGALRM, before)
     return [value.ending for kind, value in sent if kind == OUTCOME]

@@ -9,7 +9,7 @@ from hevopt.studies.case import prepare
 from hevopt.studies.rows import Row
 from hevopt.studies.settings import Settings
 from hevopt.studies.solved import run_case
-from hevopt.sweeps.plan.jobs import FIGURES, Case, Job, jobs_of
+from hevopt.sweeps.plan.jobs import FIGURES, Job, Task, jobs_of
 from hevopt.sweeps.workers.work import run_job
 
 CHANGES = {"battery.cells_in_series": 48, "machine.power_max_w": 14e3}
@@ -115,7 +115,7 @@ def test_an_exception_is_an_outcome_and_the_other_cases_go_on():
     guarded = run_job(job, Guard)
     assert [(o.ending, str(o.failure)) for o in guarded] == [("failed", "not today")] * 2
     assert [o.ending for o in run_job(broken)] == ["failed"] * 2
-    weak = Job("A", {}, "us06", False, (Case("k", 0.0, "baseline"),))
+    weak = Job("A", {}, "us06", False, (Task("k", 0.0, "baseline"),))
     (outcome,) = run_job(weak)
     assert outcome.ending == "infeasible" and "Nm missing" in str(outcome.failure)
     assert {o.ending for o in run_job(impossible)} <= {"ok", "infeasible", "failed"}
