@@ -144,6 +144,29 @@ def test_a_class_name_means_one_thing():
     assert shared.keys() <= SHARED, {name: shared[name] for name in shared.keys() - SHARED}
 
 
+def fields_named(doc: str) -> list[str]:
+    """The names that lines "name, other: what they are" of a docstring describe."""
+    parts = [part for line in doc.split("\n")[1:] for part in line.split("; ")]
+    heads = (re.match(r"\s*([a-z_0-9]+(?:, [a-z_0-9]+)*): ", part) for part in parts)
+    return [name for head in heads if head for name in head.group(1).split(", ")]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_docstrings_of_classes_describe_fields_that_are_there(path):
+    """A field may be called without its unit."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ClassDef) and ast.get_docstring(node):
+            own = [part for part in node.body if isinstance(part, ast.AnnAssign | ast.FunctionDef)]
+            names = [
+                part.target.id if isinstance(part, ast.AnnAssign) else part.name for part in own
+            ]
+            if any(isinstance(part, ast.AnnAssign) for part in own):
+                for name in fields_named(ast.get_docstring(node)):
+                    assert any(known == name or known.startswith(f"{name}_") for known in names), (
+                        f"{node.name} has no {name}"
+                    )
+
+
 def test_tests_mirror_the_rooms():
     rooms = {path.parent.relative_to(PACKAGE) for path in MODULES} - {Path(".")}
     apart = {Path("benchmarks"), Path("fuzzing"), Path("proofs"), Path("data"), Path(".")}

@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 class Vehicle(Shown):
     """A car without its powertrain.
 
-    road_load: (4,) force on a level road as polynomial of speed, F = r0 + r1 v + r2 v² + r3 v³ (N, m/s);
-    rolling resistance times cos of the slope is contained in `rolling_n`, its (4,) share that scales so.
+    rolling_n, air_n: (4,) forces on a level road as polynomials of speed, r0 + r1 v + r2 v² + r3 v³ (N, m/s); of
+    these the rolling resistance scales with the cosine of the slope
     braking: what the machine may take of it; None: all that machine and battery can
     """
 

@@ -41,7 +41,7 @@ class Way:
     closing: those that are solved for, chosen -> those of its part
     slack: what gives way to the friction brake while the car brakes; None where nothing but the brake acts on
     the wheels, or where it holds them (standing)
-    free_wheels: the one-way clutches that do not push
+    freed: the one-way clutches that do not push; tied: whether the engine turns with the wheels
     """
 
     uses: tuple[Use, ...]

@@ -34,7 +34,9 @@ _SOC_LEVEL_SHARE = 0.25
 class Rules(Shown):
     """Indices that each rule would take, per step; -1 where a step has none.
 
-    off, electric, recover: (time,); standing, launching, braking, power_w: (time,) class and wheel power
+    off, electric, recover: (time,); standing, engaging, braking, power_w: (time,) class and wheel power, engaging
+    being standing with a gear engaged; fired: (entry,) whether the engine burns fuel
+    charge_w: (level,) charging powers of the engine; price_kgpj: what a joule of end charge is worth
     """
 
     problem: Problem
