@@ -28,6 +28,8 @@ _APART, _MACH_MAX = 0.0301, 1.8
 # head_max, head_exponent, surge_flow, its rise, what choke lies above _APART at _MACH_MAX, choke's fall
 _LOW = np.array([0.1, 1.2, 0.0, 0.0, 0.0, 0.0])
 _HIGH = np.array([1.5, 20.0, 2.0, 2.0, 2.0, 2.0])
+# Of any wheel: flow over density, disc area and rim speed; isentropic work over its square.
+_FLOW, _HEAD = (1e-4, 2.0), (0.0, 3.0)
 _EXPONENTS = (1.6, 2.5, 5.0)
 _WORK_LOW, _WORK_HIGH = (0.1, 0.0, 0.0), (2.0, 10.0, 0.2)
 _ABOVE_HEAD = 1.001
@@ -63,6 +65,7 @@ def fit_compressor(points: TurboPoints, diameter_m: float, place: str) -> Compre
     phi = flow / (density * np.pi / 4 * diameter_m**2 * rim)
     cp = gas.air_a_jpkgk + gas.air_b_jpkgk2 * kelvin
     psi = cp * kelvin * (points.ratio ** (gas.constant_jpkgk / cp) - 1) / rim**2
+    _check_size(phi, psi, place)
     first = _first_of_lines(points, phi)
     found = _line_form(phi, psi, mach, first, place)
     head, exponent, surge, rise, gap, fall = found
@@ -79,6 +82,17 @@ def fit_compressor(points: TurboPoints, diameter_m: float, place: str) -> Compre
     off = np.where(np.abs(of_flow) < np.abs(of_ratio), of_flow, of_ratio)
     taken = work[0] - work[1] * phi + work[2] / phi
     return CompressorFit(wheel, speed, flow, off, psi / taken - points.efficiency)
+
+
+def _check_size(phi: Array, psi: Array, place: str) -> None:
+    """DataError where flow or head are none of a wheel of this size."""
+    for what, found, (low, high) in (("flow number", phi, _FLOW), ("head", psi, _HEAD)):
+        off = (found < low) | (found > high)
+        if off.any():
+            raise DataError(
+                f"{place}: {what} {found[off][0]:.3g} of the rim speed; allowed: {low:g} to {high:g}; check units, "
+                "reference and the wheel's diameter"
+            )
 
 
 def _check_shape(points: TurboPoints, speed: Array, flow: Array, place: str) -> None:

@@ -152,7 +152,7 @@ BAD = {
     "per cent as share": ([(c := own_lines())[0], c[1], c[2], 100 * c[3]], "efficiency 5.*allowed: above 0"),
     "no flow": (with_values(1, 3, 0.0), "line 5: flow 0; allowed: above 0"),
     "an empty cell": (with_values(2, 4, np.nan), "line 6: no ratio; allowed"),
-    "a wheel too small": (own_lines(), "surge and choke cross within the map|head .* of a rim speed"),
+    "a wheel too small": (own_lines(), "flow number 2.* of the rim speed; allowed: 0.0001 to 2; check units"),
 }  # fmt: skip
 
 
