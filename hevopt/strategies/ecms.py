@@ -8,6 +8,8 @@ The end charge jumps as s moves, because a nearly straight fuel map makes many s
 no s is neutral two neighbouring factors share the cycle, changing once on the way, in either order; and a plan
 that would end short is also tried with the charge made good as late as possible. The cheapest plan tried that
 ends with at least the asked charge is taken.
+
+Where the charge window binds, s jumps: one factor a stretch is found (_segments.py), and their mixed path followed.
 """
 
 import numpy as np
@@ -20,6 +22,7 @@ from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies._rollout import reach_of, roll
 from hevopt.strategies._rollout_kernels import Grid
+from hevopt.strategies._segments import binds, segments
 
 _FACTOR_TOLERANCE = 1e-7
 _BRACKET_STEPS_MAX = 60
@@ -27,6 +30,10 @@ _HALVINGS_MAX = 100
 # A factor below this share of the guess decides among free controls alone, as the least factor above 0 does.
 _NEGLIGIBLE = 1e-9
 _ENERGY_ROUNDING = 1e-12
+# Passes over the segments; pulls to their path, as shares of the factor; nodes on which the pull is drawn.
+_PASSES = 2
+_PULLS = (1e-3, 1e-2, 0.05, 0.15)
+_NODES = 401
 
 
 class _Search:
@@ -44,6 +51,19 @@ class _Search:
     def surplus_j(self, price_kgpj: Array, *, to_the_end: bool = False) -> float:
         """Stored energy above the asked end charge under (time,) prices; `to_the_end`: never below it."""
         low, high = self.problem.window_j
+        value = self._value_kg(price_kgpj, np.array([low, high]))
+        return self._tried(price_kgpj, value, high - low, to_the_end=to_the_end)
+
+    def follow(self, price_kgpj: Array, energy_j: Array, pull_kgpj: float) -> None:
+        """Try (time,) prices, charge being drawn to (time + 1,) energies by a price on the distance from them."""
+        low, high = self.problem.window_j
+        nodes = np.linspace(low, high, _NODES)
+        value = self._value_kg(price_kgpj, nodes)
+        value += pull_kgpj * np.abs(nodes - energy_j[:, None, None])
+        self._tried(price_kgpj, value, (high - low) / (_NODES - 1), to_the_end=True)
+
+    def _value_kg(self, price_kgpj: Array, nodes_j: Array) -> Array:
+        """(time + 1, mode, node) cost to go under prices, less the worth of what is stored."""
         choices = self.choices
         priced = choices.cost_kg + choices.spread(price_kgpj) * self.drain_j
         before_kgpj = before_steps(price_kgpj)
@@ -51,9 +71,14 @@ class _Search:
         # A mode without a way on is never entered: the reach is empty there.
         to_go = np.where(np.isfinite(to_go), to_go, 0.0)
         of_step = np.concatenate([price_kgpj[:1], price_kgpj])[:, None, None]
-        value = to_go[:, :, None] - of_step * np.array([low, high])
+        value: Array = to_go[:, :, None] - of_step * nodes_j
+        return value
+
+    def _tried(self, price_kgpj: Array, value: Array, cell_j: float, *, to_the_end: bool) -> float:
+        """The surplus of the rollout that follows a value function, kept where it is the cheapest with enough."""
+        choices, (low, high) = self.choices, self.problem.window_j
         reach = self.bound_reach if to_the_end else self.free_reach
-        grid = Grid(np.full(choices.steps + 1, low), high - low)
+        grid = Grid(np.full(choices.steps + 1, low), cell_j)
         path = roll(self.problem, choices, reach, value, grid)
         control = choices.control[path]
         cost_kg, energy_j = total_cost_kg(self.problem, control)
@@ -77,9 +102,25 @@ def solve(problem: Problem) -> Plan:
     if cheap < dear:
         _change_once(search, dear, cheap)
         _change_once(search, cheap, dear)
+    if binds(problem, search.choices, search.drain_j, cheap, dear):
+        _follow_segments(search, guess)
     first, last = search.best_prices
     notes = {"price_kgpj": first, "price_at_end_kgpj": last}
     return Plan(search.best_control, notes)
+
+
+def _follow_segments(search: _Search, guess: float) -> None:
+    """Try factors that jump where the window binds, drawn to the charge that they stand for; twice, the second time
+    with falls of stored energy as they are along it."""
+    problem, choices = search.problem, search.choices
+    drain_j = search.drain_j
+    for _ in range(_PASSES):
+        found = segments(problem, choices, drain_j, guess)
+        for pull in _PULLS:
+            search.follow(
+                found.price_kgpj, found.energy_j, pull * max(guess, found.price_kgpj.max())
+            )
+        drain_j = drain_at_j(problem, choices, found.energy_j[:-1])
 
 
 def _change_once(search: _Search, before: float, after: float) -> None:
