@@ -90,7 +90,9 @@ def test_labels_of_the_energy_flow_are_apart_in_every_row(nedc, shown, media):
     page = shown.page
     page.emulate_media(media=media)
     settle(page)
-    for n in range(len(nedc.results.rows)):
+    # On paper, where the flow is as wide in every row, the last one of each car.
+    last = {row.figures.architecture: n for n, row in enumerate(nedc.results.rows)}
+    for n in range(len(nedc.results.rows)) if media == "screen" else last.values():
         # What is not on paper cannot be chosen by hand.
         choose = "(s, n) => { s.value = n; s.dispatchEvent(new Event('change')); }"
         page.locator("#row").evaluate(choose, str(n))
