@@ -11,7 +11,7 @@ from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.evaluated import evaluated
-from hevopt.powertrain.grids import Gridded, gridded, is_gridded, most_nm
+from hevopt.powertrain.grids import Gridded, gridded, is_gridded, most_nm, refined
 from hevopt.powertrain.kinetic import Kinetic, kinetic_of
 from hevopt.powertrain.levels import Around, labels, levels_of
 from hevopt.powertrain.operation import Setting, setting
@@ -131,6 +131,7 @@ def _packed_branch(
     for stretch in found:
         if is_gridded(stretch.way, follows_load=car.driveline.follows_load):
             points += gridded(car, driver, stretch, state, levels)
+            points += () if around is None else refined(car, driver, stretch, state, levels, around)
             continue
         here = setting(car, stretch.way, stretch.shafts)
         chosen = levels_of(here, state, levels, around)

@@ -20,6 +20,7 @@ from hevopt.car.parts import WHEEL
 from hevopt.car.ways import Way
 from hevopt.driving.demand import Demand
 from hevopt.powertrain.evaluated import Evaluated, battery_idle, evaluated
+from hevopt.powertrain.levels import ADDED_PLACES, Around
 from hevopt.powertrain.operation import Setting, completed, flowing, setting
 from hevopt.powertrain.phases import Driver, Stretch
 from hevopt.powertrain.shafts import shafts_of, value_of
@@ -61,17 +62,16 @@ def gridded(
     """All points of a way at its steps."""
     way, shafts, counts = stretch.way, stretch.shafts, _counts(stretch.way, levels)
     if "free" in way.held.values():
-        speeds = _speeds(car, driver.demand, stretch, counts[0])
+        low, high = _speed_limits(car, driver.demand, stretch)
+        best = np.clip(_best_speeds(car, driver.demand, stretch), low[:, None], high[:, None])
+        speeds = np.column_stack([_even(low, high, counts[0]), best])
         step = np.repeat(stretch.step, speeds.shape[1])
         shafts = shafts_of(car, driver.demand, way, step, driver.launch_radps, speeds.ravel())
     here, outer = setting(car, way, shafts), dict[str, Array]()
     for name in way.chosen[:-1]:
         low, high = _own_limits(here, name)
         grid = np.column_stack([_even(low, high, counts[0]), np.zeros_like(low)])
-        repeated = np.repeat(np.arange(len(low)), grid.shape[1])
-        here = setting(car, way, here.shafts.picked(repeated))
-        outer = {other: torque[repeated] for other, torque in outer.items()}
-        outer[name] = grid.reshape(-1, 1)
+        here, outer = _repeated(here, outer, name, grid)
     yield from _inner(here, state, outer, counts[1], driver.demand.step_s)
 
 
@@ -83,8 +83,56 @@ def _counts(way: Way, levels: int) -> tuple[int, int]:
     return max(_LEAST_COUNT, round(_OUTER_SHARE * levels)), levels
 
 
-def _speeds(car: Architecture, demand: Demand, stretch: Stretch, count: int) -> Array:
-    """(step, speed) engine speeds, rad/s, at which no machine turns faster than it may."""
+def refined(
+    car: Architecture, driver: Driver, stretch: Stretch, state: State, levels: int, around: Around
+) -> Iterator[Gridded]:
+    """Points of a way close to those of a plan, at the steps where it drives in it."""
+    way, counts, centre = stretch.way, _counts(stretch.way, levels), around.points.get(state, {})
+    free = "free" in way.held.values()
+    names = [*way.chosen, *(["speed"] if free else [])]
+    if not way.chosen or not set(names) <= set(centre):
+        return
+    known = ~np.isnan([centre[name][stretch.step] for name in names]).any(axis=0)
+    shafts = stretch.shafts.picked(np.flatnonzero(known))
+    if not known.any():
+        return
+    far = [around.share * (levels - 1) / (count - 1) for count in counts]
+    if free:
+        low, high = (limit[known] for limit in _speed_limits(car, driver.demand, stretch))
+        speeds = _close(centre["speed"][shafts.step], far[0], low, high)
+        step = np.repeat(shafts.step, speeds.shape[1])
+        shafts = shafts_of(car, driver.demand, way, step, driver.launch_radps, speeds.ravel())
+    here, outer = setting(car, way, shafts), dict[str, Array]()
+    for name in way.chosen[:-1]:
+        grid = _close(centre[name][here.shafts.step], far[0], *_own_limits(here, name))
+        here, outer = _repeated(here, outer, name, grid)
+    name = way.chosen[-1]
+    low, high, _ = _span(here, outer, name)
+    grid = np.sort(_close(centre[name][here.shafts.step], far[1], low, high), axis=1)
+    given = {**outer, name: grid}
+    done = evaluated(here, state, given, driver.demand.step_s)
+    yield Gridded(here, given, done, np.diff(grid, axis=1, prepend=-np.inf) <= 0)
+
+
+def _close(centre: Array, far: float, low: Array, high: Array) -> Array:
+    """(state, added) values around a centre, the outermost as far as a share of what is open, within it."""
+    added = centre[:, None] + far * (high - low)[:, None] * ADDED_PLACES
+    clipped = np.clip(added, low[:, None], high[:, None])
+    return np.where(ADDED_PLACES == 0, centre[:, None], clipped)
+
+
+def _repeated(
+    here: Setting, outer: Mapping[str, Array], name: str, grid: Array
+) -> tuple[Setting, dict[str, Array]]:
+    """Every state once for each torque of a (state, torque) grid of one more actuator."""
+    times = np.repeat(np.arange(len(grid)), grid.shape[1])
+    more = setting(here.car, here.way, here.shafts.picked(times))
+    given = {other: torque[times] for other, torque in outer.items()}
+    return more, {**given, name: grid.reshape(-1, 1)}
+
+
+def _speed_limits(car: Architecture, demand: Demand, stretch: Stretch) -> tuple[Array, Array]:
+    """(step,) engine speeds, rad/s, between which no machine turns faster than it may."""
     step, ratios, gear = stretch.step, speeds_of(stretch.way), stretch.shafts.gear
     engine, shaft = car.engine, stretch.way.active[ENGINE]
     low = np.full(len(step), engine.idle_radps)
@@ -97,10 +145,14 @@ def _speeds(car: Architecture, demand: Demand, stretch: Stretch, count: int) -> 
         rest = value_of(ratios[at], {WHEEL: wheels}, gear)
         ends = np.sort([(machine.speed_max_radps * sign - rest) / own for sign in (-1, 1)], axis=0)
         low, high = np.maximum(low, ends[0]), np.minimum(high, ends[1])
-    power = np.maximum(demand.wheel_power_w[step], 0.0) + car.vehicle.auxiliary_power_w
-    best = engine.best_radps(power[:, None] * _DEMAND_SHARES)
-    best = np.clip(best, low[:, None], np.maximum(low, high)[:, None])
-    return np.column_stack([_even(low, high, count), best])
+    return low, np.maximum(low, high)
+
+
+def _best_speeds(car: Architecture, demand: Demand, stretch: Stretch) -> Array:
+    """(step, power) engine speeds of least fuel for the demand and a little more."""
+    wheels_w = np.maximum(demand.wheel_power_w[stretch.step], 0.0)
+    power_w = (wheels_w + car.vehicle.auxiliary_power_w)[:, None] * _DEMAND_SHARES
+    return car.engine.best_radps(power_w)
 
 
 def _even(low: Array, high: Array, count: int) -> Array:

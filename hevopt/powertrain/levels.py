@@ -7,7 +7,7 @@ torque, battery idle, engine at its best efficiency, and fuel cut without fricti
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from hevopt.problem.arrays import Array, Flags, Indices
 
 _BRAKING_LEVELS = 6
 _TORQUE_TOLERANCE_NM = 1e-6
-_ADDED_PLACES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+ADDED_PLACES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 _SPECIAL_LEVELS = ("zero torque", "battery idle", "best efficiency", "fuel cut")
 
 
@@ -28,16 +28,18 @@ class Around(Shown):
 
     torque_nm: state -> (time,) torque of the plan, NaN where it drives in another state
     share: distance of the outermost torque added, as a share of what is open at the step
+    points: state -> actuator -> (time,) torque, and "speed" -> that of the engine; NaN likewise
     """
 
     torque_nm: Mapping[State, Array]
     share: float
+    points: Mapping[State, Mapping[str, Array]] = field(default_factory=dict)
 
     def added_nm(self, state: State, step: Indices, low: Array, high: Array) -> Array:
         """(state, added) torques; the lowest open one again where the plan drives in another state."""
         known = self.torque_nm.get(state)
         centre = (np.full(low.shape, np.nan) if known is None else known[step])[:, None]
-        added = centre + self.share * (high - low)[:, None] * _ADDED_PLACES
+        added = centre + self.share * (high - low)[:, None] * ADDED_PLACES
         low, high = np.minimum(low, high)[:, None], np.maximum(low, high)[:, None]
         return np.where(np.isnan(added), low, np.clip(added, low, high))
 
@@ -58,7 +60,7 @@ def labels(follows_load: bool, state: State, levels: int, around: Around | None)
     named = tuple(f"{share:.3f}" for share in shares)
     if not state.engine_on:
         return named
-    added = () if around is None else tuple(f"refined {place:+.2f}" for place in _ADDED_PLACES)
+    added = () if around is None else tuple(f"refined {place:+.2f}" for place in ADDED_PLACES)
     return (*named, *_SPECIAL_LEVELS, *added)
 
 

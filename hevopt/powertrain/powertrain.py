@@ -10,7 +10,6 @@ torques in torques.py, what limits leave of the controls in rejects.py: one engi
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.car.driveline import State
 from hevopt.driving.cycle import Cycle
 from hevopt.driving.demand import Demand, demand_of
 from hevopt.driving.driver import change_down
@@ -45,7 +44,7 @@ def build_problem(
     """The energy-management problem of a car on a cycle, charge at the end no less than the car's `soc_end`.
 
     levels: machine torques per step and joint; nox_weight: kg of fuel that a kg of NOx counts;
-    around: where to add torques with the engine on, see `torques_of`.
+    around: where to add controls with the engine on, see `around_plan`.
     Raises InfeasibleError, listing steps and missing torque, where no control follows the cycle; with
     `allow_shortfall` such steps are driven with what the powertrain can give, and marked in the table.
     """
@@ -98,8 +97,8 @@ def build_table(
     return _assemble(architecture, demand, found, missing)
 
 
-def torques_of(trajectory: Trajectory, table: ControlTable) -> dict[State, Array]:
-    """State of the driveline -> (time,) torque that a trajectory chooses in it, NaN elsewhere."""
+def around_plan(trajectory: Trajectory, table: ControlTable, share: float) -> Around:
+    """Where to add torques, and engine speeds where they are free: close to what a trajectory chooses."""
     flows, control = table.flows, trajectory.control
     if isinstance(flows, RepeatedFlows):
         control = flows.columns[control]
@@ -111,10 +110,13 @@ def torques_of(trajectory: Trajectory, table: ControlTable) -> dict[State, Array
     torque = np.full(len(states), np.nan)
     for values in given.values():
         torque = np.where(np.isnan(torque), values, torque)
-    return {
-        state: np.where([other == state for other in states], torque, np.nan)
-        for state in dict.fromkeys(states)
-    }
+    found = {**given, "speed": trajectory.flows["engine_speed_radps"]}
+    torques, points = {}, {}
+    for state in dict.fromkeys(states):
+        here = np.array([other == state for other in states])
+        torques[state] = np.where(here, torque, np.nan)
+        points[state] = {name: np.where(here, values, np.nan) for name, values in found.items()}
+    return Around(torques, share, points)
 
 
 def _rejects(found: list[Branch]) -> Bits:

@@ -10,7 +10,7 @@ from hevopt.driving.cycle import Cycle
 from hevopt.errors import UnknownNoxError
 from hevopt.files.shown import printable
 from hevopt.powertrain.levels import Around
-from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_problem, torques_of
+from hevopt.powertrain.powertrain import TORQUE_LEVELS, around_plan, build_problem
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import dp
@@ -76,7 +76,7 @@ def prepare(
     share = 0.5 / (levels - 1)
     for _ in range(_REFINEMENTS_MAX if settings.refine else 0):
         before = case
-        around = Around(torques_of(case.dp_trajectory, case.problem.table), share)
+        around = around_plan(case.dp_trajectory, case.problem.table, share)
         case = case_with(around)
         case = replace(case, dp_s=case.dp_s + before.dp_s)
         moved_kg = abs(case.dp_trajectory.cost_kg - before.dp_trajectory.cost_kg)

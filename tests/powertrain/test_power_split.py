@@ -18,6 +18,7 @@ from hevopt.powertrain.phases import driver_of, stretches
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.powertrain.shafts import shafts_of
 from hevopt.studies.case import prepare
+from hevopt.studies.settings import Settings
 from hevopt.units import litres_per_100km
 
 PRIUS = load_architecture("prius_1998")
@@ -132,6 +133,16 @@ def test_what_is_left_out_is_in_no_optimum(monkeypatch):
     assert every.dp_trajectory.cost_kg == pytest.approx(few.dp_trajectory.cost_kg, rel=1e-9)
     bounds = [case.certificate.bound_of(case.dp_trajectory)[0] for case in (every, few)]
     assert bounds[0] == pytest.approx(bounds[1], rel=1e-9)
+
+
+def test_points_close_to_the_plan_make_it_no_dearer():
+    plain, closer = (
+        prepare(PRIUS, short("udds", 140), Settings(refine=refine)) for refine in (False, True)
+    )
+    costs = [case.dp_trajectory.cost_kg for case in (closer, plain)]
+    assert 0.98 * costs[1] < costs[0] < costs[1]
+    bound_kg, _ = closer.certificate.bound_of(closer.dp_trajectory)
+    assert bound_kg <= costs[0]
 
 
 def test_kinetic_energy_is_that_of_shafts_whose_speed_is_not_chosen():
