@@ -67,6 +67,9 @@ _COLUMNS = (
     ),
     _Column("s", _number("solve_s", ".2f"), 11),
 )
+# Only where another end charge than the start's is asked; before the corrected fuel.
+_BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", ".2f"), 0)
+_BATTERY_PLACE = 7
 
 
 def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
@@ -76,6 +79,8 @@ def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
     message is printed apart.
     """
     columns = list(_COLUMNS)
+    if comparison.end_asked:
+        columns.insert(_BATTERY_PLACE, _BATTERY)
     if width is None or _width(_table(comparison, columns)) <= width:
         return _table(comparison, columns)
     leaving = sorted(columns, key=lambda column: column.leaves)
@@ -169,8 +174,8 @@ def _end_notes(comparison: Comparison) -> str:
     return (
         f"end charge asked, other than the start's: {end_asked_text(comparison.end_asked)}. "
         "ΔE/fuel and corrected count only what is left beyond it;\n"
-        "electricity drawn from the battery down to it (or stored up to it) is not counted as fuel, nor in "
-        "vs ref.\n"
+        "electricity drawn from the battery down to it (or stored up to it) is the column battery, from start to "
+        "end; it is not counted as fuel, nor in vs ref.\n"
     )
 
 

@@ -27,7 +27,8 @@ class Row(Shown):
 
     status: its marks, or why it has no figures
     delta_energy_percent: stored energy at the end above what is asked, as a share of the fuel's;
-    fuel_corrected_l_per_100km: fuel less what that energy is worth
+    electricity_kwh_per_100km: stored energy that the drive took from the battery, start less end
+    fuel_corrected_l_per_100km: fuel less what the surplus is worth
     bound_l_per_100km: least of fuel + weighted NOx that any plan with this row's end charge could reach,
     as fuel volume; gap_percent: this row's own sum above it
     """
@@ -43,6 +44,7 @@ class Row(Shown):
     soc_start: float | None = None
     soc_end: float | None = None
     delta_energy_percent: float | None = None
+    electricity_kwh_per_100km: float | None = None
     fuel_corrected_l_per_100km: float | None = None
     engine_starts: int | None = None
     bound_l_per_100km: float | None = None
@@ -89,6 +91,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
         soc_start=problem.soc_start,
         soc_end=float(trajectory.soc[-1]),
         delta_energy_percent=_percent(surplus_j, fuel_j),
+        electricity_kwh_per_100km=(problem.start_j - trajectory.end_j) / 3.6e6 / km * 100,
         fuel_corrected_l_per_100km=litres(car, cycle, fuel_kg - certificate.price_kgpj * surplus_j),
         engine_starts=engine_starts(problem, trajectory),
         bound_l_per_100km=litres(car, cycle, bound_kg),

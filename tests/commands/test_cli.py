@@ -14,8 +14,8 @@ from command_line import call
 from hevopt.studies.rows import Row
 
 KEYS = """architecture, strategy, status, fuel_l_per_100km, delta_fuel_percent, co2_g_per_km, nox_mg_per_km,
-delta_nox_percent, soc_start, soc_end, delta_energy_percent, fuel_corrected_l_per_100km, engine_starts,
-bound_l_per_100km, gap_percent, certificate, solve_s"""
+delta_nox_percent, soc_start, soc_end, delta_energy_percent, electricity_kwh_per_100km,
+fuel_corrected_l_per_100km, engine_starts, bound_l_per_100km, gap_percent, certificate, solve_s"""
 
 
 def test_json_has_the_promised_keys_in_order(monkeypatch, capsys):

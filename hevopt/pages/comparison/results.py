@@ -37,6 +37,7 @@ class RowFigures(FileModel):
     soc_start: Number | None
     soc_end: Number | None
     delta_energy_percent: Number | None
+    electricity_kwh_per_100km: Number | None = None
     fuel_corrected_l_per_100km: Number | None
     engine_starts: Whole | None
     bound_l_per_100km: Number | None
