@@ -12,7 +12,7 @@ from hevopt import (
     simulate,
     solve,
 )
-from hevopt.powertrain.powertrain import torques_of
+from hevopt.powertrain.powertrain import around_plan
 
 ON_S, OFF_S = 5.0, 3.0
 
@@ -54,7 +54,7 @@ def test_the_rule_as_a_stepper_takes_what_its_plan_takes(solved):
 
 def test_torques_are_told_of_a_plan_that_keeps_to_it(solved):
     problem, run, _ = solved
-    torques = torques_of(run, problem.table)
+    torques = around_plan(run, problem.table, 0.1).torque_nm
     assert sum(np.isfinite(torque).sum() for torque in torques.values()) > 500
 
 
