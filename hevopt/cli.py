@@ -12,6 +12,7 @@ from hevopt import __version__
 from hevopt.commands import (
     architectures,
     coasting,
+    driving,
     importing,
     listing,
     mapping,
@@ -51,6 +52,7 @@ for command in (
     solving.compare,
     solving.run,
     solving.table,
+    driving.drive,
     listing.strategies,
     reporting.report,
     architectures.validate,

@@ -30,7 +30,7 @@ class Pace(NamedTuple):
 
 
 @compiled()
-def clutch_capacity_nm(slip_radps, clutch):
+def clutch_capacity_nm(slip_radps: float, clutch: Clutch) -> float:
     """Highest torque of the closed clutch at a slip of either sign, equation (17)."""
     stuck = (clutch.slipping_nm - clutch.sticking_nm) * np.exp(
         -abs(slip_radps) / clutch.slip_scale_radps
@@ -39,7 +39,7 @@ def clutch_capacity_nm(slip_radps, clutch):
 
 
 @compiled()
-def pace_of(step_s, lag_s):
+def pace_of(step_s: float, lag_s: float) -> Pace:
     """Shares of a first-order lag under constant input: exact, whatever the step."""
     if lag_s <= 0.0:
         return Pace(step_s, 0.0, 0.0)
@@ -48,7 +48,7 @@ def pace_of(step_s, lag_s):
 
 
 @compiled()
-def pacejka_share(slip, tyre):
+def pacejka_share(slip: float, tyre: Tyre) -> float:
     """Longitudinal force over load and friction at a slip, Pacejka's magic formula."""
     stretched = tyre.stiffness * slip
     bent = stretched - tyre.curvature * (stretched - np.arctan(stretched))
@@ -56,7 +56,7 @@ def pacejka_share(slip, tyre):
 
 
 @compiled()
-def resistance(speed, slope_rad, body):
+def resistance(speed: float, slope_rad: float, body: Body) -> tuple[float, float, float]:
     """Rolling and air resistance, its derivative by speed, and the weight's share along the road."""
     r, a, cos, sin = body.rolling_n, body.air_n, 1.0, 0.0
     if slope_rad != 0.0:
@@ -68,7 +68,7 @@ def resistance(speed, slope_rad, body):
 
 
 @compiled()
-def grip_n(against_n, slope_rad, body):
+def grip_n(against_n: float, slope_rad: float, body: Body) -> float:
     """Highest driving force (4) with the load that acceleration and slope move off the front axle."""
     tyre, weight = body.tyre, body.mass_kg * STANDARD_GRAVITY_MPS2
     moved = tyre.height_share * body.mass_kg / body.equivalent_kg

@@ -17,18 +17,14 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.forward import _rows_kernels as col
-from hevopt.forward._contact_kernels import grip_n, resistance
-from hevopt.forward._rows_kernels import State, fill_row, turning
+from hevopt.forward._contact_kernels import Body, Pace, grip_n, resistance
+from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, turning
+from hevopt.forward._solve_kernels import Motion, Solved, directions, reached, solve, sums
 
 # Rounds of guessing the directions of power; each flips those that proved wrong.
 _ROUNDS = 8
-# Power below which a direction is a matter of rounding.
-_TINY_W = 1e-9
 # Share of a speed within which a moving ratio is settled.
 _SETTLED = 1e-13
-# Slip of a locked clutch, by rounding.
-_NO_SLIP_RADPS = 1e-9
 
 
 class Outputs(NamedTuple):
@@ -44,156 +40,10 @@ class Outputs(NamedTuple):
     locked: bool
 
 
-class _Sums(NamedTuple):
-    """What a row and the torques of machines and brake make of the two equations, per change of speed."""
-
-    ratio: float
-    slip: float
-    engine: float
-    clutch: float
-    per_w: float
-    per_n: float
-    known: float
-    side_engine: float
-    side_per_w: float
-    side_per_n: float
-    side_known: float
-
-
-class _Motion(NamedTuple):
-    """The wheels' equation: own (w' - w) = rest + per_nm x torque."""
-
-    rest: float
-    own: float
-    per_nm: float
-
-
-class _Solved(NamedTuple):
-    """Changes of both speeds, and the torques of engine and clutch."""
-
-    wheel: float
-    side: float
-    engine_nm: float
-    clutch_nm: float
-    locked: bool
-
-
 @compiled()
-def _sums(row, machine_nm, brake_nm, slip, per_s):
-    known, side_known = -row[col.MOVED] * per_s - brake_nm, -row[col.SIDE_MOVED] * per_s
-    for m in range(len(machine_nm)):
-        at = col.MACHINES + col.PER_MACHINE * m
-        known += row[at] * machine_nm[m]
-        side_known += row[at + 1] * machine_nm[m]
-    return _Sums(
-        row[col.RATIO], slip, row[col.ENGINE], row[col.CLUTCH], row[col.PER_W] * per_s, row[col.PER_N] * per_s,
-        known, row[col.SIDE_ENGINE], row[col.SIDE_PER_W] * per_s, row[col.SIDE_PER_N] * per_s, side_known,
-    )  # fmt: skip
-
-
-@compiled()
-def _free(s, motion, engine_nm, clutch_nm):
-    """Both changes for given torques."""
-    own = motion.own + motion.per_nm * s.per_w
-    across = motion.per_nm * s.per_n
-    right = motion.rest + motion.per_nm * (s.known + s.engine * engine_nm + s.clutch * clutch_nm)
-    below = s.side_known + s.side_engine * engine_nm - clutch_nm
-    wheel = (right * s.side_per_n - across * below) / (own * s.side_per_n - across * s.side_per_w)
-    return _Solved(
-        wheel, (below - s.side_per_w * wheel) / s.side_per_n, engine_nm, clutch_nm, False
-    )
-
-
-@compiled()
-def _locked(s, motion, engine_nm):
-    """Both changes and the clutch's torque where no slip is left after the step."""
-    inner = s.side_per_w + s.side_per_n * s.ratio
-    through = s.side_known + s.side_engine * engine_nm + s.side_per_n * s.slip
-    own = motion.own + motion.per_nm * (s.per_w + s.per_n * s.ratio + s.clutch * inner)
-    right = motion.rest + motion.per_nm * (
-        s.known + s.engine * engine_nm + s.per_n * s.slip + s.clutch * through
-    )
-    wheel = right / own
-    return _Solved(wheel, s.ratio * wheel - s.slip, engine_nm, through - inner * wheel, True)
-
-
-@compiled()
-def _governed(s, motion, side, clutch_nm):
-    """The wheels' change and the engine's torque for a given change of its side."""
-    over = s.engine / s.side_engine
-    given = s.side_per_n * side - s.side_known + clutch_nm
-    own = motion.own + motion.per_nm * (s.per_w - over * s.side_per_w)
-    right = motion.rest + motion.per_nm * (
-        s.known - s.per_n * side + over * given + s.clutch * clutch_nm
-    )
-    wheel = right / own
-    return _Solved(wheel, side, (s.side_per_w * wheel + given) / s.side_engine, clutch_nm, False)
-
-
-@compiled()
-def _solve(s, motion, governed, asked_nm, low_nm, high_nm, capacity_nm):
-    """Locked where the clutch can, else slipping at its capacity, the engine governed as far as its torque goes.
-
-    governed: change of its side's speed, NaN for an engine that gives what is asked
-    """
-    clutch_nm = 0.0
-    if capacity_nm > 0.0:
-        solved = _locked(s, motion, min(max(asked_nm, low_nm), high_nm))
-        # A slip that turns round within the step passes nothing: friction never gives energy.
-        turns = abs(s.slip) > _NO_SLIP_RADPS and solved.clutch_nm * s.slip < 0.0
-        if abs(solved.clutch_nm) <= capacity_nm and not turns:
-            return solved
-        if not turns:
-            clutch_nm = capacity_nm if solved.clutch_nm > 0.0 else -capacity_nm
-    if np.isnan(governed):
-        return _free(s, motion, asked_nm, clutch_nm)
-    solved = _governed(s, motion, governed, clutch_nm)
-    if low_nm <= solved.engine_nm <= high_nm:
-        return solved
-    return _free(s, motion, min(max(solved.engine_nm, low_nm), high_nm), clutch_nm)
-
-
-@compiled()
-def joint_torque_nm(row, joint, machine_nm, solved, per_s):
-    """Torque that enters a lossy joint."""
-    at = (
-        col.MACHINES
-        + col.PER_MACHINE * len(machine_nm)
-        + (col.JOINT_MACHINES + len(machine_nm)) * joint
-    )
-    torque = (
-        row[at + col.JOINT_ENGINE] * solved.engine_nm
-        + row[at + col.JOINT_CLUTCH] * solved.clutch_nm
-    )
-    torque -= per_s * (
-        row[at + col.JOINT_W] * solved.wheel
-        + row[at + col.JOINT_N] * solved.side
-        + row[at + col.JOINT_MOVED]
-    )
-    for m in range(len(machine_nm)):
-        torque += row[at + col.JOINT_MACHINES + m] * machine_nm[m]
-    return torque
-
-
-@compiled()
-def _directions(row, joints, variant, machine_nm, solved, mean_wheel, mean_side, per_s):
-    """The variant of a solution that was made with one; where power is rounding, the one it was made with."""
-    found = 0
-    for j in range(joints):
-        at = (
-            col.MACHINES
-            + col.PER_MACHINE * len(machine_nm)
-            + (col.JOINT_MACHINES + len(machine_nm)) * j
-        )
-        through = row[at + col.SENSE_W] * mean_wheel + row[at + col.SENSE_N] * mean_side
-        power = joint_torque_nm(row, j, machine_nm, solved, per_s) * through
-        if power < -_TINY_W or (power <= _TINY_W and variant >> j & 1):
-            found |= 1 << j
-    return found
-
-
-@compiled()
-def step(body, ways, rows, state, inputs, pace, row):
+def step(
+    body: Body, ways: Ways, rows: Array, state: State, inputs: Inputs, pace: Pace, row: Array
+) -> tuple[State, Outputs]:
     """State after a step, and what acted in it; state and inputs are left as they are.
 
     rows: settled_rows(ways); pace: pace_of(step, lag of the tyre); row: as long as one of rows, for moving ratios
@@ -203,7 +53,7 @@ def step(body, ways, rows, state, inputs, pace, row):
     per_n = pace.step_s / (body.radius_m * body.equivalent_kg)
     of_torque = 1.0 - pace.of_force
     own = 1.0 + 0.5 * pace.step_s / body.equivalent_kg * rise
-    motion = _Motion(
+    motion = Motion(
         per_n * (pace.of_force * state.force_n - passive - along), own, per_n * of_torque / body.radius_m
     )  # fmt: skip
     grip = grip_n(passive + along, inputs.slope_rad, body)
@@ -223,14 +73,18 @@ def step(body, ways, rows, state, inputs, pace, row):
                      state.side_radps + guess_side, row)  # fmt: skip
         else:
             row = rows[inputs.way, variant]
-        s = _sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s)
-        solved = _solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
+        s = sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s)
+        solved = solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                         inputs.capacity_nm)  # fmt: skip
         if solved.wheel > top or solved.wheel < -wheel:
-            rest = _Motion(top if solved.wheel > top else -wheel, 1.0, 0.0)
-            solved = _solve(s, rest, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
+            rest = Motion(top if solved.wheel > top else -wheel, 1.0, 0.0)
+            free = solved
+            solved = solve(s, rest, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                             inputs.capacity_nm)  # fmt: skip
-        found = _directions(
+            solved = Solved(rest.rest, *solved[1:])
+            if free.wheel > top and reached(s, motion, solved) < motion.own * top:
+                solved = free
+        found = directions(
             row, joints, variant, inputs.machine_nm, solved, wheel + 0.5 * solved.wheel,
             state.side_radps + 0.5 * solved.side, per_s,
         )  # fmt: skip
@@ -248,7 +102,19 @@ def step(body, ways, rows, state, inputs, pace, row):
 
 
 @compiled()
-def _after(body, state, inputs, pace, solved, variant, drive, top, passive, rise, along):
+def _after(
+    body: Body,
+    state: State,
+    inputs: Inputs,
+    pace: Pace,
+    solved: Solved,
+    variant: int,
+    drive: float,
+    top: float,
+    passive: float,
+    rise: float,
+    along: float,
+) -> tuple[State, Outputs]:
     """State and outputs; where the wheels' speed is a limit's, brakes or the road take what is over."""
     gained = solved.wheel * body.radius_m
     speed = state.speed_mps + gained

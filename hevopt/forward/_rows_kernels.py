@@ -82,21 +82,30 @@ class Inputs(NamedTuple):
 
 
 @compiled()
-def turning(rates, way, from_way, blend, unit):
+def turning(rates: Array, way: int, from_way: int, blend: float, unit: int) -> float:
     """Speed of a unit per speed of the wheels, or of the engine's side, between one gear and another."""
     end = rates[way, unit]
     return end + blend * (rates[from_way, unit] - end) if blend > 0.0 else end
 
 
 @compiled()
-def _mean_rate(rate_before, rate_after, before, after):
+def _mean_rate(rate_before: float, rate_after: float, before: float, after: float) -> float:
     """What a unit's mean speed is to the mean speed that it turns with: so that no power is lost in between."""
     total = before + after
     return (rate_before * before + rate_after * after) / total if total > 0.0 else rate_after
 
 
 @compiled()
-def fill_row(ways, state, inputs, variant, wheel, wheel_after, side_after, row):
+def fill_row(
+    ways: Ways,
+    state: State,
+    inputs: Inputs,
+    variant: int,
+    wheel: float,
+    wheel_after: float,
+    side_after: float,
+    row: Array,
+) -> None:
     """A row's columns. wheel: speed before the step; after: speeds behind it, as far as known."""
     row[:] = 0.0
     units, joints = len(ways.inertia_kgm2) - 1, ways.load.shape[2]
@@ -141,7 +150,7 @@ def fill_row(ways, state, inputs, variant, wheel, wheel_after, side_after, row):
 
 
 @compiled()
-def row_length(ways):
+def row_length(ways: Ways) -> int:
     """Columns of a row."""
     machines = len(ways.inertia_kgm2) - 2
     joints = ways.load.shape[2]
@@ -149,7 +158,7 @@ def row_length(ways):
 
 
 @compiled()
-def settled_rows(ways):
+def settled_rows(ways: Ways) -> Array:
     """(way, variant, column) rows of all ways while no ratio moves."""
     count, variants = ways.wheel_yield.shape[:2]
     rows = np.empty((count, variants, row_length(ways)))

@@ -88,7 +88,7 @@ def drive_quality(
     return DriveQuality(
         100 * energy,
         100 * distance,
-        100 * (1 - (1 + distance) / (1 + energy)),
+        100 * (1 - (1 + distance) / (1 + energy)) if energy > -1 else float("nan"),
         100 * _rating(is_.speed_change_mps, asked.speed_change_mps),
         100 * _rating(is_.inertial_j, asked.inertial_j),
         float(np.sqrt(np.mean((is_.speed_mps - asked.speed_mps) ** 2))),

@@ -61,7 +61,7 @@ def write_rows(path: Path, comparison: Comparison, about: Mapping[str, Any]) -> 
     if path.suffix.lower() == ".json":
         write_whole(path, result_json(comparison, about).encode())
     else:
-        _write_frame(path, comparison.to_frame(), about)
+        write_frame(path, comparison.to_frame(), about)
 
 
 def write_steps(
@@ -73,7 +73,7 @@ def write_steps(
         write_whole(path, json.dumps(whole, allow_nan=False).encode())
     else:
         whole = steps.assign(cycle=comparison.cycle)
-        _write_frame(path, whole[["cycle", *steps.columns]], about)
+        write_frame(path, whole[["cycle", *steps.columns]], about)
 
 
 def step_frame(case: Case, trajectory: Trajectory) -> "pd.DataFrame":
@@ -114,6 +114,11 @@ def joined(cases: Sequence[tuple[Row, "pd.DataFrame"]]) -> "pd.DataFrame":
     return whole.reset_index(level=names).reset_index(drop=True)
 
 
-def _write_frame(path: Path, frame: "pd.DataFrame", about: Mapping[str, Any]) -> None:
-    parquet = path.suffix.lower() == ".parquet"
-    write_whole(path, parquet_of([frame], about) if parquet else csv_of(frame))
+def write_frame(path: Path, frame: "pd.DataFrame", about: Mapping[str, Any]) -> None:
+    """One table; in JSON as "steps" beside what it comes from."""
+    kind = path.suffix.lower()
+    if kind == ".json":
+        whole = {**about, "steps": records_of(frame)}
+        write_whole(path, json.dumps(whole, allow_nan=False).encode())
+    else:
+        write_whole(path, parquet_of([frame], about) if kind == ".parquet" else csv_of(frame))

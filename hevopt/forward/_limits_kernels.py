@@ -1,0 +1,93 @@
+"""What engine, machine and battery can give at a speed, tabulated over even steps of speed."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt._compile import compiled
+
+Array = NDArray[np.float64]
+
+
+class Limits(NamedTuple):
+    """Curves over speed, tabulated from the car's own components; what is burnt is judged by these, not here.
+
+    engine_step, machine_step: rad/s from one value to the next
+    full_nm, least_nm: (engine speed,) highest torque, and lowest: drag
+    load_nm: (engine speed,) torque of an alternator that follows the electric load; empty where none does
+    low_nm, high_nm: (machine speed,) what machine and battery together allow
+    loss_w: (machine speed, torque) from -torque_nm to torque_nm
+    boosts, regenerates: whether the car's functions let the machine help at full load, and charge while braking
+    """
+
+    engine_step: float
+    full_nm: Array
+    least_nm: Array
+    load_nm: Array
+    machine_step: float
+    low_nm: Array
+    high_nm: Array
+    loss_w: Array
+    torque_nm: float
+    idle_radps: float
+    engine_max_radps: float
+    auxiliary_w: float
+    boosts: bool
+    regenerates: bool
+
+
+@compiled()
+def at(values: Array, step: float, x: float) -> float:
+    """A curve's value: linear, beyond its ends the last."""
+    place = min(max(x, 0.0) / step, len(values) - 1.000001)
+    i = int(place)
+    return values[i] + (place - i) * (values[i + 1] - values[i])
+
+
+@compiled()
+def smooth_at(values: Array, step: float, x: float) -> float:
+    """A smooth curve's value, by the cubic through four neighbours."""
+    place = min(max(x, 0.0) / step, len(values) - 1.000001)
+    i = min(max(int(place), 1), len(values) - 3)
+    t = place - i
+    a, b, c, d = values[i - 1], values[i], values[i + 1], values[i + 2]
+    return (
+        -t * (t - 1) * (t - 2) / 6 * a
+        + (t + 1) * (t - 1) * (t - 2) / 2 * b
+        - (t + 1) * t * (t - 2) / 2 * c
+        + (t + 1) * t * (t - 1) / 6 * d
+    )
+
+
+@compiled()
+def electric_w(torque: float, speed: float, limits: Limits) -> float:
+    """Electric power of the machine, by its tabulated loss."""
+    rows, columns = limits.loss_w.shape
+    if speed == 0.0 and torque == 0.0:
+        return 0.0
+    x = min(abs(speed) / limits.machine_step, rows - 1.000001)
+    y = (torque / limits.torque_nm + 1.0) / 2.0 * (columns - 1)
+    y = min(max(y, 0.0), columns - 1.000001)
+    i, j = int(x), int(y)
+    x, y = x - i, y - j
+    low = limits.loss_w[i, j] + y * (limits.loss_w[i, j + 1] - limits.loss_w[i, j])
+    high = limits.loss_w[i + 1, j] + y * (limits.loss_w[i + 1, j + 1] - limits.loss_w[i + 1, j])
+    return torque * speed + low + x * (high - low)
+
+
+@compiled()
+def launch_radps(need_nm: float, limits: Limits) -> float:
+    """Engine speed of a launch: idle, or the lowest above it at which full load is a tenth more than needed."""
+    speed = limits.idle_radps
+    if 1.1 * need_nm <= at(limits.full_nm, limits.engine_step, speed):
+        return speed
+    best = speed
+    while speed < limits.engine_max_radps:
+        full = at(limits.full_nm, limits.engine_step, speed)
+        if full >= 1.1 * need_nm:
+            return speed
+        if full > at(limits.full_nm, limits.engine_step, best):
+            best = speed
+        speed += 2.0
+    return best

@@ -1,0 +1,84 @@
+"""Engine at rest, started, turning, stopped; and the clutch between it and the gears. Compiled."""
+
+from typing import NamedTuple
+
+from hevopt._compile import compiled
+from hevopt.car.handling import Clutch
+from hevopt.forward._contact_kernels import clutch_capacity_nm
+from hevopt.forward._limits_kernels import Limits, launch_radps
+
+REST, STARTING, TURNING, STOPPING = 0, 1, 2, 3
+# Why the clutch slips: it does not, a launch, a change of gear or another opening, a start of the engine.
+NONE, LAUNCH, CHANGE, START = 0, 1, 2, 3
+# Braking, the clutch is opened this close to idle speed.
+_OPENS_AT = 1.02
+_CLOSED_SLIP_RADPS = 1.0
+
+
+class Joined(NamedTuple):
+    """The engine's phase and the clutch: closing from 0 to 1, whether it launches the car, why it slips."""
+
+    phase: int
+    closing: float
+    launches: bool
+    cause: int
+    launch_radps: float
+
+
+@compiled()
+def phase_after(phase: int, on: bool, side_radps: float, idle_radps: float) -> int:
+    """The phase of a step, in which the engine is wanted turning or not."""
+    if on:
+        if phase == TURNING or (phase == STARTING and side_radps >= idle_radps * (1 - 1e-9)):
+            return TURNING
+        return STARTING
+    if phase == REST or side_radps <= 0.0:
+        return REST
+    return STOPPING
+
+
+@compiled()
+def joined(
+    before: Joined,
+    phase: int,
+    apart: bool,
+    neutral: bool,
+    braking: bool,
+    input_radps: float,
+    need_nm: float,
+    limits: Limits,
+    clutch: Clutch,
+    step_s: float,
+) -> Joined:
+    """The clutch of a step.
+
+    apart: a change of gear holds it open; neutral: so does the cycle
+    need_nm: torque at the clutch that the driver asks for
+    """
+    if phase != TURNING:
+        cause = START if phase == STARTING else NONE
+        return Joined(phase, 0.0, False, cause, limits.idle_radps)
+    if apart:
+        return Joined(phase, 0.0, False, CHANGE, limits.idle_radps)
+    if neutral or (braking and input_radps < _OPENS_AT * limits.idle_radps):
+        return Joined(phase, 0.0, False, before.cause, limits.idle_radps)
+    launch = launch_radps(need_nm, limits) if need_nm > 0.0 else limits.idle_radps
+    launch = max(launch, before.launch_radps) if before.launches else launch
+    if not braking and input_radps < launch and (before.closing < 1.0 or before.launches):
+        return Joined(phase, 0.0, True, LAUNCH, launch)
+    if not braking and input_radps < limits.idle_radps:
+        return Joined(phase, 0.0, True, LAUNCH, launch)
+    if before.launches:
+        return Joined(phase, 1.0, False, LAUNCH, limits.idle_radps)
+    closing = 1.0 if clutch.closing_s <= 0 else min(before.closing + step_s / clutch.closing_s, 1.0)
+    cause = before.cause if before.closing < 1.0 else NONE
+    return Joined(phase, closing, False, cause, limits.idle_radps)
+
+
+@compiled()
+def capacity_nm(joint: Joined, need_nm: float, slip_radps: float, clutch: Clutch) -> float:
+    """The clutch's torque at most: all it has while it closes, what is asked for in a launch."""
+    highest = clutch_capacity_nm(slip_radps, clutch)
+    if joint.launches:
+        return min(need_nm, highest)
+    return joint.closing * highest

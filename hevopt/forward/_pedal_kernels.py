@@ -1,0 +1,92 @@
+"""The driver at the pedals: a force at the tyres from the speed wanted, by feed-forward and a PID. Compiled."""
+
+from typing import NamedTuple
+
+from hevopt._compile import compiled
+from hevopt.forward._contact_kernels import Body, resistance
+from hevopt.forward._rows_kernels import Array
+
+
+class Driver(NamedTuple):
+    """A PID on the speed with feed-forward of acceleration and resistance; gains count per mass of the car.
+
+    F = feed_forward [m_eq a + F_res(v)] of the trace + m (proportional e + derivative de/dt + ∫ integral e dt)
+
+    preview_s: how far ahead it looks; hold_mps: below it a car that shall stand is held
+    governor_s: time constant of an engine that keeps idle speed or is brought to the next gear's
+    start_s: from rest to idle speed by the starter; stop_s: from idle speed to rest
+    charge_per_s: gain by which a plan's stored energy is kept, as power per energy amiss
+    """
+
+    proportional: float = 1.2
+    integral: float = 0.3
+    derivative: float = 0.0
+    feed_forward: float = 1.0
+    preview_s: float = 0.0
+    hold_mps: float = 0.15
+    governor_s: float = 0.15
+    start_s: float = 0.4
+    stop_s: float = 0.3
+    charge_per_s: float = 0.2
+
+
+class Pedal(NamedTuple):
+    """What the driver remembers, the integral as a force, and asks for: force at the tyres, acceleration, rest."""
+
+    integral_n: float
+    error_mps: float
+    force_n: float
+    accel_mps2: float
+    holds: bool
+
+
+_STANDSTILL_MPS = 0.02
+_HOLD_MPS2 = 3.0
+
+
+@compiled()
+def wanted_at(time_s: Array, speed_mps: Array, at_s: float, k: int) -> float:
+    """The trace's speed at a time in its step k or a later one."""
+    last = len(time_s) - 1
+    while k < last - 1 and at_s >= time_s[k + 1]:
+        k += 1
+    share = min(max((at_s - time_s[k]) / (time_s[k + 1] - time_s[k]), 0.0), 1.0)
+    return speed_mps[k] + share * (speed_mps[k + 1] - speed_mps[k])
+
+
+@compiled()
+def pressed(
+    pedal: Pedal,
+    now: float,
+    ahead: float,
+    speed: float,
+    slope_rad: float,
+    body: Body,
+    driver: Driver,
+    step_s: float,
+) -> Pedal:
+    """The pedal for a step: now and ahead are the trace's speeds at its ends."""
+    error = now - speed
+    if ahead <= _STANDSTILL_MPS and now <= _STANDSTILL_MPS and speed < driver.hold_mps:
+        return Pedal(0.0, error, -_HOLD_MPS2 * body.mass_kg, 0.0, True)
+    accel = (ahead - now) / step_s
+    passive, _, along = resistance(0.5 * (now + ahead), slope_rad, body)
+    force = driver.feed_forward * (body.equivalent_kg * accel + passive + along) + pedal.integral_n
+    force += body.mass_kg * (
+        driver.proportional * error + driver.derivative * (error - pedal.error_mps) / step_s
+    )
+    most = body.tyre.friction * body.mass_kg * 9.80665
+    force = min(max(force, -most), most)
+    passive, _, along = resistance(speed, slope_rad, body)
+    return Pedal(
+        pedal.integral_n, error, force, (force - passive - along) / body.equivalent_kg, False
+    )
+
+
+@compiled()
+def remembered(pedal: Pedal, frozen: bool, body: Body, driver: Driver, step_s: float) -> Pedal:
+    """The integral after a step, as it was where the car could not follow in its sense."""
+    if frozen or pedal.holds:
+        return pedal
+    grown = pedal.integral_n + step_s * body.mass_kg * driver.integral * pedal.error_mps
+    return Pedal(grown, pedal.error_mps, pedal.force_n, pedal.accel_mps2, pedal.holds)

@@ -1,0 +1,200 @@
+"""What a driven car burnt, drew and lost: powers of every step from what acted in it, and what does not add up.
+
+With mean speeds of a step all changes of kinetic energy are exact, so that every component balances to rounding.
+Fuel, NOx, the machine's loss and the battery are the car's own, worked out on what the loop returns.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown
+from hevopt.forward import _drive_kernels as col
+from hevopt.forward import _motor_kernels as motor
+from hevopt.forward.lines import Line
+from hevopt.problem import battery as battery_model
+from hevopt.problem._battery_kernels import trace
+from hevopt.problem.arrays import Array, Flags
+
+CAUSES = {motor.LAUNCH: "launch", motor.CHANGE: "change", motor.START: "start", motor.NONE: "other"}
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Books(Shown):
+    """Powers, speeds and torques of every step, W, rad/s, Nm, (step,) by the names of the backward flows and more.
+
+    residuals: component -> (step,) power in less power out less loss
+    energy_j: (step + 1,) stored energy; off_map: (step,) where a measured map of the engine or machine ends
+    """
+
+    flows: Mapping[str, Array]
+    residuals: Mapping[str, Array]
+    energy_j: Array
+    off_map: Flags
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Turning(Shown):
+    """Speeds around every step. wheel, side: (step + 1,); units: (unit, step + 1); all rad/s.
+
+    by_wheel: of `units` the part that the wheels turn
+    """
+
+    wheel: Array
+    side: Array
+    units: Array
+    by_wheel: Array
+
+    @staticmethod
+    def mean(values: Array) -> Array:
+        """Of a step, (..., step)."""
+        return (values[..., 1:] + values[..., :-1]) / 2
+
+
+def turning_of(line: Line, record: Array, start: tuple[float, float], radius_m: float) -> Turning:
+    """Speeds of wheels, engine's side and all units; start: speed of the car and of the engine's side."""
+    wheel = np.append(start[0], record[:, col.SPEED]) / radius_m
+    side = np.append(start[1], record[:, col.SIDE])
+    way = record[:, col.WAY].astype(np.int64)
+    way, from_way = np.append(way[0], way), np.append(way[0], record[:, col.FROM_WAY].astype(int))
+    blend = np.append(0.0, record[:, col.BLEND])[:, None]
+    by_wheel, by_side = (
+        (rate[way] + blend * (rate[from_way] - rate[way])).T
+        for rate in (line.ways.wheel, line.ways.side)
+    )
+    return Turning(wheel, side, by_wheel * wheel + by_side * side, by_wheel * wheel)
+
+
+def books_of(
+    car: Architecture, line: Line, record: Array, start: tuple[float, float, float], step_s: float
+) -> Books:
+    """The books of a run; start: the car's speed, the engine side's and stored energy before the first step."""
+    turning = turning_of(line, record, start[:2], car.vehicle.tyre_radius_m)
+    mean = turning.mean
+    w, n, units = mean(turning.wheel), mean(turning.side), mean(turning.units)
+    inertia = line.ways.inertia_kgm2[:, None] * np.diff(turning.units**2, axis=1) / (2 * step_s)
+    flows = _driven(car, record, w, n, units, inertia, step_s)
+    flows |= _joints(line, record, turning, step_s)
+    flows |= _burnt(car, flows)
+    electric = flows["machine_electric_w"] + flows["auxiliary_power_w"]
+    energy_j = trace(
+        start[2], np.zeros(len(record)), electric, np.full(len(record), step_s), car.battery.arrays
+    )
+    flows |= _battery(car, energy_j, electric, step_s)
+    off_map = np.isnan(flows["fuel_power_w"]) | np.isnan(flows["machine_loss_w"])
+    return Books(flows, _residuals(flows), energy_j, off_map)
+
+
+def _driven(
+    car: Architecture,
+    record: Array,
+    w: Array,
+    n: Array,
+    units: Array,
+    inertia: Array,
+    step_s: float,
+) -> dict[str, Array]:
+    """Mechanical powers but for those of the joints."""
+    radius, phase = car.vehicle.tyre_radius_m, record[:, col.PHASE].astype(int)
+    torque = record[:, col.ENGINE]
+    turns = phase == motor.TURNING
+    clutch = record[:, col.CLUTCH] * (n - units[-1])
+    cause = record[:, col.CAUSE].astype(int)
+    speed = w * radius
+    before = np.append(2 * speed[0] - record[0, col.SPEED], record[:-1, col.SPEED])
+    flows = {
+        "speed_mps": speed,
+        "engine_torque_nm": np.where(turns, torque, 0.0),
+        "engine_speed_radps": n,
+        "start_w": np.where(phase == motor.STARTING, torque * n, 0.0),
+        "stop_w": np.where(turns | (phase == motor.STARTING), 0.0, torque * n),
+        "engine_inertia_w": inertia[0],
+        "machine_torque_nm": record[:, col.MACHINE],
+        "machine_speed_radps": units[1],
+        "machine_power_w": record[:, col.MACHINE] * units[1],
+        "machine_inertia_w": inertia[1],
+        "clutch_torque_nm": record[:, col.CLUTCH],
+        "clutch_loss_w": clutch,
+        "brake_power_w": record[:, col.BRAKE] * w,
+        "held_w": record[:, col.HELD] * w,
+        "wheel_power_w": record[:, col.WHEEL] * w,
+        "tyre_lag_w": record[:, col.WHEEL] * w - record[:, col.TYRE] * speed,
+        "road_w": record[:, col.ROAD] * speed,
+        "kinetic_w": car.vehicle.equivalent_mass_kg
+        * (record[:, col.SPEED] ** 2 - before**2)
+        / (2 * step_s),
+        "auxiliary_power_w": np.full(len(record), car.vehicle.auxiliary_power_w),
+    }
+    for number, name in CAUSES.items():
+        flows[f"clutch_{name}_w"] = np.where(cause == number, clutch, 0.0)
+    return flows
+
+
+def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[str, Array]:
+    """Losses of gearbox and gears: what enters each joint, less what it passes on.
+
+    A torque enters with the speed of its unit, which while a ratio moves is not yet that of its gear.
+    """
+    ways, way = line.ways, record[:, col.WAY].astype(np.int64)
+    variant = record[:, col.VARIANT].astype(np.int64)
+    applied = np.stack([record[:, col.ENGINE], record[:, col.MACHINE], record[:, col.CLUTCH]])
+    applied -= ways.inertia_kgm2[:, None] * np.diff(turning.units, axis=1) / step_s
+    power = applied * turning.mean(turning.by_wheel)
+    settled = ways.wheel[way]
+    per_wheel = np.divide(1.0, settled, out=np.zeros_like(settled), where=settled != 0)
+    result = {"gearbox_loss_w": np.zeros(len(way)), "gear_loss_w": np.zeros(len(way))}
+    for j, name in enumerate(line.losses):
+        share = ways.load[way, variant, j] * ways.sense[way, j, :1] * per_wheel
+        entering, eta = np.einsum("nu,un->n", share, power), ways.efficiency[way, j]
+        backward = (variant >> j & 1).astype(bool)
+        result[f"{name}_loss_w"] += entering * np.where(backward, 1 - 1 / eta, 1 - eta)
+    return result
+
+
+def _burnt(car: Architecture, flows: Mapping[str, Array]) -> dict[str, Array]:
+    """Fuel, NOx and the machine's electric power, by the car's own components."""
+    torque, speed = flows["engine_torque_nm"], flows["engine_speed_radps"]
+    turns = (speed > 0) & (flows["start_w"] == 0) & (flows["stop_w"] == 0)
+    fuel = np.where(turns, car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)), 0.0)
+    nox = np.where(fuel == 0, 0.0, car.engine.nox_kgps(torque, np.where(turns, speed, 1.0)))
+    power = fuel * car.engine.heating_value_jpkg
+    machine = np.abs(flows["machine_speed_radps"])
+    loss = car.machines[0].loss_w(flows["machine_torque_nm"], machine)
+    return {
+        "fuel_kgps": fuel,
+        "nox_kgps": nox,
+        "fuel_power_w": power,
+        "engine_loss_w": power - torque * speed,
+        "machine_loss_w": loss,
+        "machine_electric_w": flows["machine_power_w"] + loss,
+    }
+
+
+def _battery(car: Architecture, energy_j: Array, power_w: Array, step_s: float) -> dict[str, Array]:
+    """Losses from current and resistance, to hold against the change of stored energy."""
+    pack = car.battery
+    _, voltage, discharge, charge = battery_model.states(pack, energy_j[:-1])
+    resistance = np.where(power_w < 0, charge, discharge)
+    current = battery_model.source_power_w(power_w, voltage, resistance)[0] / voltage
+    coulombic = (1 - pack.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
+    return {
+        "battery_power_w": power_w,
+        "battery_chemical_w": (energy_j[:-1] - energy_j[1:]) / step_s,
+        "battery_loss_w": resistance * current**2 + coulombic,
+    }
+
+
+def _residuals(f: Mapping[str, Array]) -> dict[str, Array]:
+    engine_w = f["engine_torque_nm"] * f["engine_speed_radps"] + f["start_w"] + f["stop_w"]
+    inertia_w = f["engine_inertia_w"] + f["machine_inertia_w"]
+    lost_w = f["clutch_loss_w"] + f["gearbox_loss_w"] + f["gear_loss_w"] + f["brake_power_w"]
+    return {
+        "driveline": engine_w + f["machine_power_w"] + f["held_w"] - inertia_w - lost_w
+        - f["wheel_power_w"],
+        "road": f["wheel_power_w"] - f["tyre_lag_w"] - f["road_w"] - f["kinetic_w"],
+        "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
+        "electric bus": f["battery_power_w"] - f["machine_electric_w"] - f["auxiliary_power_w"],
+        "battery": f["battery_chemical_w"] - f["battery_power_w"] - f["battery_loss_w"],
+    }  # fmt: skip

@@ -1,0 +1,191 @@
+"""A driveline as the plant reads it: rates, yields and loads of every way to drive, from the same parts and joints.
+
+The ways are those in which the driver's clutch slips, so that the engine's side turns by itself: the wheels and
+that side are free, every joint but the clutch gives a speed row, and the torques on the units reach wheels and side
+by the balance of the other shafts. A closed clutch is then a torque, an open one none.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.car.balance import speeds_of
+from hevopt.car.driveline import ENGINE, Driveline, Phase, State
+from hevopt.car.linear import Row, Terms, solved
+from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Joint
+from hevopt.car.ways import Way, way
+from hevopt.display.facts import Shown
+from hevopt.errors import DataError
+from hevopt.forward._rows_kernels import Ways
+
+_NET = "net torque on "
+_OUTPUT = "clutch's output"
+Key = tuple[int, tuple[tuple[str, int], ...], frozenset[str]]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Line(Shown):
+    """A driveline's ways as arrays, and which is which.
+
+    keys: of each way the gear listed, the gears chosen beside it, and what its own speed has opened
+    losses: of each lossy joint, what its loss is called
+    fast_way: (way,) the way with couplings opened that turn too fast; fast_radps: (way,) speed of the wheels for it
+    """
+
+    ways: Ways
+    keys: tuple[Key, ...]
+    losses: tuple[str, ...]
+    fast_way: np.ndarray
+    fast_radps: np.ndarray
+
+    def index(self, gear: int, gears: tuple[tuple[str, int], ...]) -> int:
+        """The way of a listed gear and the gears chosen beside it; of the nearest gear where these exclude it."""
+        fits = [
+            n for n, (_, chosen, open_) in enumerate(self.keys) if chosen == gears and not open_
+        ]
+        return min(fits, key=lambda n: (abs(self.keys[n][0] - gear), self.keys[n][0]))
+
+    @property
+    def gears(self) -> np.ndarray:
+        """(way,) the listed gear."""
+        return np.array([gear for gear, _, _ in self.keys])
+
+
+def line_of(car: Architecture) -> Line:
+    """The ways of a car; DataError where its driveline asks for more than a driver and one machine decide."""
+    _check(car)
+    line = car.driveline
+    keys = [key for key in _keys(line)]
+    joints = {key: _way(line, key).joints(key[0]) for key in keys}
+    lossy = _lossy(joints[key] for key in keys)
+    machines = [name for name, _ in line.machines]
+    inertia = [car.engine.inertia_kgm2, *(m.inertia_kgm2 for m in car.machines), 0.0]
+    units, count, variants = len(inertia), len(keys), 1 << len(lossy)
+    ways = Ways(
+        np.zeros((count, units)), np.zeros((count, units)),
+        np.ones((count, variants, units)), np.ones((count, variants, units)),
+        np.zeros((count, variants, len(lossy), units)), np.zeros((count, len(lossy), 2)),
+        np.ones((count, len(lossy))), np.array(inertia),
+    )  # fmt: skip
+    for n, key in enumerate(keys):
+        _fill(ways, n, _way(line, key), joints[key], tuple(lossy), (ENGINE, *machines), key[0])
+    fast_way, fast = np.arange(count), np.full(count, np.inf)
+    for n, (gear, gears, opened) in enumerate(keys):
+        for part in _limited(line):
+            if not opened:
+                fast_way[n] = keys.index((gear, gears, frozenset([part.name])))
+                per_wheel = speeds_of(_way(line, keys[n]))[part.first][WHEEL]
+                fast[n] = part.speed_max_radps / abs(float(np.max(np.abs(per_wheel))))
+    return Line(ways, tuple(keys), tuple(lossy.values()), fast_way, fast)
+
+
+def _check(car: Architecture) -> None:
+    line, lacking = car.driveline, ""
+    odd = [part.name for part in line.parts if not isinstance(part, Gear | Gearbox | Clutch)]
+    odd += [p.name for p in line.parts if isinstance(p, Clutch) and p.operation != "driver"]
+    if line.engine is None or car.engine is None or not line.boxes or not line.driver_clutches:
+        lacking = "it has no engine behind a driver's clutch and gears"
+    elif line.free_engine_speed:
+        lacking = "its engine's speed is free"
+    elif odd:
+        lacking = f"the strategy moves {', '.join(odd)}"
+    elif len(line.machines) != 1:
+        lacking = f"it has {len(line.machines)} machines"
+    elif len(_limited(line)) > 1 or any(box.choice == "free" for box in line.boxes):
+        lacking = "more than one part follows a choice of its own"
+    if lacking:
+        raise DataError(
+            f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "
+            "machine, and an engine behind a driver's clutch and gears, can; `hevopt run` solves it backward"
+        )
+
+
+def _limited(line: Driveline) -> list[Gear]:
+    return [p for p in line.parts if isinstance(p, Gear) and np.isfinite(p.speed_max_radps)]
+
+
+def _keys(line: Driveline) -> list[Key]:
+    """Every listed gear with every choice beside it that goes with it, couplings closed, then open."""
+    chosen = [box for box in line.boxes if box.choice == "preselected"]
+    listed = sorted(gear for box in line.boxes for gear in box.gears)
+    opened = [frozenset[str](), *(frozenset([part.name]) for part in _limited(line))]
+    keys: list[Key] = []
+    for open_, gear in product(opened, listed):
+        for gears in product(*([(box.name, g) for g in box.gears] for box in chosen)):
+            if all(gear not in box.gears or (box.name, gear) in gears for box in chosen):
+                keys.append((gear, gears, open_))
+    return keys
+
+
+def _way(line: Driveline, key: Key) -> Way:
+    gear, gears, opened = key
+    box = next(box.name for box in line.boxes if gear in box.gears)
+    return way(line, State(True, gears), Phase(False, "slipping", box, opened))
+
+
+def _lossy(joints: object) -> dict[str, str]:
+    """Joint with loss -> what the loss is called, of all ways."""
+    found: dict[str, str] = {}
+    for of_way in joints:  # type: ignore[attr-defined]
+        found |= {joint.name: joint.loss for joint in of_way if not joint.lossless}
+    return found
+
+
+def _fill(
+    ways: Ways, n: int, found: Way, joints: tuple[Joint, ...], lossy: tuple[str, ...],
+    units: tuple[str, ...], gear: int,
+) -> None:  # fmt: skip
+    """One way's entries."""
+    clutch = next(joint for joint in joints if not joint.speed)
+    side = next(iter(found.held))
+    at = dict(found.active)
+    at[_OUTPUT] = next(shaft for shaft, (c0, _) in clutch.reaction.items() if float(c0) > 0)
+    rates = speeds_of(found)
+
+    def rate(shaft: str, base: str) -> float:
+        coefficient = rates[shaft].get(base, 0.0)
+        return float(coefficient[gear] if isinstance(coefficient, np.ndarray) else coefficient)
+
+    for u, name in enumerate((*units, _OUTPUT)):
+        if name in at:
+            ways.wheel[n, u], ways.side[n, u] = rate(at[name], WHEEL), rate(at[name], side)
+    for j, name in enumerate(lossy):
+        joint = next((joint for joint in joints if joint.name == name), None)
+        if joint is not None:
+            ways.efficiency[n, j] = float(joint.efficiency)
+            for b, base in enumerate((WHEEL, side)):
+                terms = (float(c) * rate(shaft, base) for shaft, c in joint.sense.items())
+                ways.sense[n, j, b] = sum(terms)
+    for variant in range(1 << len(lossy)):
+        sums = _sums(found, joints, clutch, side, at, lossy, variant)
+        for u, name in enumerate((*units, _OUTPUT)):
+            for base, of_unit, yields in (
+                (WHEEL, ways.wheel, ways.wheel_yield),
+                (side, ways.side, ways.side_yield),
+            ):
+                if of_unit[n, u] != 0.0:
+                    passed = float(sums[_NET + base].get(name, 0.0))
+                    yields[n, variant, u] = passed / of_unit[n, u]
+            for j, joint_name in enumerate(lossy):
+                ways.load[n, variant, j, u] = float(sums.get(joint_name, {}).get(name, 0.0))
+
+
+def _sums(
+    found: Way, joints: tuple[Joint, ...], clutch: Joint, side: str, at: dict[str, str],
+    lossy: tuple[str, ...], variant: int,
+) -> dict[str, Terms]:  # fmt: skip
+    """Torque in each joint, and left on wheels and engine's side, in terms of the torques on the units."""
+    rows = []
+    for shaft in found.shafts:
+        left: Terms = {_NET + shaft: -1.0} if shaft in (WHEEL, side) else {}
+        for joint in joints:
+            if joint is not clutch and shaft in joint.reaction:
+                c0, c1 = (float(c) for c in joint.reaction[shaft])
+                backward = joint.name in lossy and variant >> lossy.index(joint.name) & 1
+                passed = 1 / float(joint.efficiency) if backward else float(joint.efficiency)
+                left[joint.name] = c0 + c1 * passed
+        right: Terms = {name: -1.0 for name, where in at.items() if where == shaft}
+        rows.append(Row(shaft, left, right))
+    return solved(rows)

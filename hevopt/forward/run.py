@@ -1,0 +1,226 @@
+"""A car driven along a trace by a driver at the pedals, engine and gears by a plan."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.car.handling import Clutch, Shifting, Tyre, check_ranges
+from hevopt.display.facts import Shown
+from hevopt.driving.cycle import Cycle
+from hevopt.errors import DataError
+from hevopt.forward import _drive_kernels as col
+from hevopt.forward import _motor_kernels as motor
+from hevopt.forward._contact_kernels import Body
+from hevopt.forward._pedal_kernels import Driver
+from hevopt.forward.books import Books, books_of
+from hevopt.forward.limits import limits_of
+from hevopt.forward.lines import Line, line_of
+from hevopt.forward.plans import ForwardPlan
+from hevopt.forward.quality import DriveQuality, drive_quality
+from hevopt.forward.stability import check_gains
+from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.battery import energy_j, soc
+
+_Part = TypeVar("_Part", Tyre, Clutch, Shifting, Driver)
+STEP_S = 0.01
+STEP_RANGE_S = (0.001, 0.1)
+STEPS_MAX = 20_000_000
+
+
+class Handling(NamedTuple):
+    """Tyres, clutch, gear changes and driver of a car; shifting None: by the kind of its gearbox."""
+
+    tyre: Tyre = Tyre()
+    clutch: Clutch = Clutch()
+    shifting: Shifting | None = None
+    driver: Driver = Driver()
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ForwardRun(Shown):
+    """A driven trace; (step,) but for what is a state: time_s, speed_mps, wanted_mps, energy_j, soc, (step + 1,).
+
+    gear: the one listed; engine: 0 at rest, 1 started, 2 turning, 3 stopped
+    planned_j: (step + 1,) stored energy of the plan; full: engine and machine give all, and it is too little
+    starts, start_fuel_kg: of the engine, and what they count
+    """
+
+    car: Architecture
+    cycle: Cycle
+    step_s: float
+    handling: Handling
+    time_s: Array
+    speed_mps: Array
+    wanted_mps: Array
+    gear: Indices
+    engine: Indices
+    full: np.ndarray
+    books: Books
+    soc: Array
+    planned_j: Array
+    quality: DriveQuality
+    starts: int
+    start_fuel_kg: float
+
+    @property
+    def fuel_kg(self) -> float:
+        """Fuel burnt, starts included."""
+        return float(np.nansum(self.books.flows["fuel_kgps"])) * self.step_s + self.start_fuel_kg
+
+    @property
+    def nox_kg(self) -> float:
+        """NOx emitted."""
+        return float(np.nansum(self.books.flows["nox_kgps"])) * self.step_s
+
+    @property
+    def distance_m(self) -> float:
+        """Distance driven."""
+        return float(np.sum(self.books.flows["speed_mps"])) * self.step_s
+
+    @property
+    def energy_j(self) -> Array:
+        """(step + 1,) stored energy."""
+        return self.books.energy_j
+
+    @property
+    def missed(self) -> bool:
+        """Whether the trace was left by more than its tolerance."""
+        return bool(self.quality.violations)
+
+    @property
+    def residual(self) -> Mapping[str, float]:
+        """Component -> energy that does not add up, largest sum over the run, as a share of its throughput."""
+        flows, found = self.books.flows, {}
+        through = float(np.abs(flows["wheel_power_w"]).sum() + np.abs(flows["road_w"]).sum())
+        for name, values in self.books.residuals.items():
+            found[name] = float(np.abs(values).sum()) / max(through, 1e-9)
+        return found
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "car": self.car.name,
+            "cycle": self.cycle.name,
+            "fuel_kg": self.fuel_kg,
+            "soc_end": float(self.soc[-1]),
+            "rmsse_kmh": 3.6 * self.quality.speed_error_mps,
+            "violations": len(self.quality.violations),
+        }
+
+
+def shifting_of(car: Architecture) -> Shifting:
+    """Half a second without torque behind one clutch; none where each half of the gears has its own."""
+    gap_s = 0.0 if len(car.driveline.driver_clutches) > 1 else Shifting().gap_s
+    return Shifting(gap_s=gap_s)
+
+
+def follow(
+    car: Architecture,
+    cycle: Cycle,
+    plan: ForwardPlan,
+    *,
+    step_s: float = STEP_S,
+    handling: Handling | None = None,
+    line: Line | None = None,
+) -> ForwardRun:
+    """The car driven along the cycle, engine and gears as planned.
+
+    step_s: 0.001 to 0.1 s, shortened so that a whole number of steps fills the cycle; line: `line_of(car)`
+    A trace that cannot be followed is driven on; the run's `quality` says where it was left. DataError for a step
+    or a figure out of range, a driveline that cannot be driven forward, and a battery that empties on the way.
+    """
+    handling = handling or Handling()
+    _check(cycle, step_s, handling)
+    line = line or line_of(car)
+    shifting = handling.shifting or shifting_of(car)
+    count = int(np.ceil(cycle.duration_s / step_s - 1e-9))
+    exact_s = cycle.duration_s / count
+    record = np.zeros((count, col.COLUMNS))
+    driven = _loop_car(car, line, handling, shifting)
+    start_j = float(plan.energy_j[0])
+    col.drive(driven, _task(cycle, plan), start_j, exact_s, record)
+    return _run_of(car, cycle, plan, line, Handling(handling.tyre, handling.clutch, shifting,
+                   handling.driver), record, exact_s)  # fmt: skip
+
+
+def _loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifting) -> col.Car:
+    vehicle, pack = car.vehicle, car.battery
+    body = Body(
+        float(vehicle.mass_kg), float(vehicle.equivalent_mass_kg), float(vehicle.tyre_radius_m),
+        _four(vehicle.rolling_n), _four(vehicle.air_n), _floats(handling.tyre),
+        _floats(handling.clutch),
+    )  # fmt: skip
+    low, high = (float(energy_j(pack, end)) for end in (pack.soc_min, pack.soc_max))
+    return col.Car(body, line.ways, line.fast_way, line.fast_radps, limits_of(car), pack.arrays,
+                   (low, high), _floats(shifting), _floats(handling.driver))  # fmt: skip
+
+
+def _floats(part: _Part) -> _Part:
+    """One type for the compiled loop, whatever was given."""
+    return type(part)(*map(float, part))
+
+
+def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
+    a, b, c, d = map(float, values)
+    return a, b, c, d
+
+
+def _task(cycle: Cycle, plan: ForwardPlan) -> col.Task:
+    def own(values: Array) -> Array:
+        return np.array(values, dtype=np.float64)
+
+    return col.Task(
+        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), plan.way,
+        plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j,
+    )  # fmt: skip
+
+
+def _run_of(
+    car: Architecture, cycle: Cycle, plan: ForwardPlan, line: Line, handling: Handling,
+    record: Array, step_s: float,
+) -> ForwardRun:  # fmt: skip
+    start_mps, on = float(cycle.speed_mps[0]), bool(plan.engine_on[0])
+    turns = line.ways.wheel[plan.way[0], -1] * start_mps / car.vehicle.tyre_radius_m
+    side = max(car.engine.idle_radps, turns) if on else 0.0
+    books = books_of(car, line, record, (start_mps, side, float(plan.energy_j[0])), step_s)
+    time_s = cycle.time_s[0] + step_s * np.arange(len(record) + 1)
+    _check_charge(car, books, time_s)
+    speed = np.append(start_mps, record[:, col.SPEED])
+    wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)
+    phase = record[:, col.PHASE].astype(np.int64)
+    starts = int(np.sum((phase[1:] == motor.STARTING) & (phase[:-1] != motor.STARTING)))
+    starts += int(phase[0] == motor.STARTING)
+    return ForwardRun(
+        car, cycle, step_s, handling, time_s, speed, wanted,
+        line.gears[record[:, col.WAY].astype(np.int64)], phase, record[:, col.FULL] > 0, books,
+        soc(car.battery, books.energy_j), np.interp(time_s, cycle.time_s, plan.energy_j),
+        drive_quality(car.vehicle, time_s, speed, wanted), starts,
+        starts * car.engine.start_fuel_kg,
+    )  # fmt: skip
+
+
+def _check(cycle: Cycle, step_s: float, handling: Handling) -> None:
+    low, high = STEP_RANGE_S
+    if not low <= step_s <= high:
+        raise DataError(f"step {step_s:g} s; allowed: {low:g} to {high:g} s")
+    if cycle.duration_s / step_s > STEPS_MAX:
+        raise DataError(
+            f"cycle {cycle.name}: {cycle.duration_s / step_s:.3g} steps of {step_s:g} s; allowed: {STEPS_MAX:g}; "
+            "choose a longer step"
+        )
+    for part in (handling.tyre, handling.clutch, handling.shifting):
+        if part is not None:
+            check_ranges(part)
+    check_gains(handling.driver, handling.tyre, step_s)
+
+
+def _check_charge(car: Architecture, books: Books, time_s: Array) -> None:
+    lost = ~np.isfinite(books.energy_j) & ~books.off_map.any()
+    lost |= books.energy_j < 0
+    if lost.any():
+        raise DataError(
+            f"{car.name}: the battery is empty at t = {time_s[int(np.argmax(lost))]:g} s; raise soc_start, choose "
+            "a larger battery or a lower electric load"
+        )

@@ -1,0 +1,205 @@
+"""A forward run for the terminal, as JSON and as a table of its steps."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from hevopt.files.shown import printable
+from hevopt.forward import _motor_kernels as motor
+from hevopt.forward.run import ForwardRun
+from hevopt.studies.driven import Driven
+from hevopt.units import KMH_PER_MPS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Flow -> what it is in the audit: where energy comes from, and where it goes.
+SOURCES = {"fuel_power_w": "fuel", "battery_chemical_w": "battery"}
+SINKS = {
+    "engine_loss_w": "engine",
+    "stop_w": "engine's momentum at stops",
+    "clutch_launch_w": "clutch, launches",
+    "clutch_change_w": "clutch, changes",
+    "clutch_start_w": "clutch, starts",
+    "clutch_other_w": "clutch, else",
+    "gearbox_loss_w": "gearbox",
+    "gear_loss_w": "machine's gear",
+    "machine_loss_w": "machine",
+    "battery_loss_w": "battery's loss",
+    "brake_power_w": "brakes",
+    "tyre_lag_w": "tyre lag",
+    "road_w": "road",
+    "auxiliary_power_w": "auxiliaries",
+}
+_TINY_J = 0.5
+
+
+def twin_table(driven: Driven) -> Table:
+    """The run, its backward twin and the bound of that."""
+    run, back = driven.run, driven.backward
+    title = f"{run.car.name}, {driven.strategy} on {run.cycle.name}"
+    table = _table(printable(title), "", "fuel\nl/100 km", "corrected\nl/100 km", "NOx\nmg/km",
+                   "SOC\nend", "starts\n", "status\n")  # fmt: skip
+    table.add_row(
+        "forward", f"{driven.fuel_l_per_100km:.4f}", f"{driven.corrected_l_per_100km:.4f}",
+        _number(driven.nox_mg_per_km, 1), f"{run.soc[-1]:.4f}", f"{run.starts}",
+        Text(", ".join(driven.marks) or "ok"),
+    )  # fmt: skip
+    table.add_row(
+        "backward", _number(back.fuel_l_per_100km, 4), _number(back.fuel_corrected_l_per_100km, 4),
+        _number(back.nox_mg_per_km, 1), _number(back.soc_end, 4), f"{back.engine_starts}",
+        Text(str(back.status)),
+    )  # fmt: skip
+    table.add_row("bound", f"{driven.bound_l_per_100km:.4f}", "", "", f"{run.soc[-1]:.4f}", "", "")
+    return table
+
+
+def audit_table(driven: Driven) -> Table:
+    """Where the energy came from and where it went."""
+    table = _table("energy, kJ", "from\n", "\nkJ", "to\n", "\nkJ")
+    given = [(name, value) for name, value in audit(driven.run).items() if value > _TINY_J]
+    taken = [(name, -value) for name, value in audit(driven.run).items() if value < -_TINY_J]
+    for n in range(max(len(given), len(taken))):
+        cells: list[str] = []
+        for side in (given, taken):
+            name, value = side[n] if n < len(side) else ("", None)
+            cells += [name, "" if value is None else f"{value / 1e3:.1f}"]
+        table.add_row(*cells)
+    return table
+
+
+def audit(run: ForwardRun) -> dict[str, float]:
+    """Name -> energy that came from there, J; negative where it went there. The sum is 0 up to rounding.
+
+    The starter's work comes from what a start counts in fuel; a loss that is negative (tyre lag) gives.
+    """
+    flows = run.books.flows
+
+    def joules(name: str) -> float:
+        return float(np.nansum(flows[name])) * run.step_s
+
+    found = {name: joules(flow) for flow, name in SOURCES.items()}
+    found["starter"] = joules("start_w")
+    # What is braked at stops comes back out of the shafts as a loss.
+    found |= {
+        name: joules(flow) if flow == "stop_w" else -joules(flow) for flow, name in SINKS.items()
+    }
+    kinetic = joules("kinetic_w") + joules("engine_inertia_w") + joules("machine_inertia_w")
+    found["kinetic energy left"] = -kinetic
+    return found
+
+
+def notes(driven: Driven) -> str:
+    """Drive quality, where the trace was left, and what the difference is made of."""
+    run, q = driven.run, driven.run.quality
+    lines = [
+        f"drive quality (SAE J2951): RMSSE {q.speed_error_mps * KMH_PER_MPS:.3f} km/h, "
+        f"ER {q.energy_percent:+.2f} %, DR {q.distance_percent:+.3f} %, EER {q.energy_economy_percent:+.2f} %, "
+        f"ASCR {q.speed_change_percent:+.2f} %, IWR {q.inertial_work_percent:+.2f} %",
+        trace_text(run),
+        f"at full load {run.full.sum() * run.step_s:.1f} s; "
+        f"distance {run.distance_m - run.cycle.distance_m:+.2f} m; "
+        f"charge at the end {driven.charge_error:+.4f} against the plan's",
+        f"forward against backward, charge-corrected: {driven.change_percent:+.2f} %; by kind of step: "
+        + ", ".join(f"{kind} {value:+.2f} %" for kind, value in driven.difference_percent.items()),
+        "energy that does not add up, as a share of what passed the wheels: "
+        + ", ".join(f"{name} {value:.0e}" for name, value in run.residual.items()),
+    ]
+    return "\n".join(lines)
+
+
+def trace_text(run: ForwardRun) -> str:
+    """Where and for how long the trace was left by more than its tolerance."""
+    left = run.quality.violations
+    if not left:
+        return "trace: within ±2 km/h and ±1 s everywhere"
+    longest = max(left, key=lambda one: one.duration_s)
+    return (
+        f"trace: left ±2 km/h and ±1 s {len(left)} time{'s' if len(left) > 1 else ''}, "
+        f"{run.quality.outside_s:.1f} s; "
+        f"longest {longest.duration_s:.1f} s from t = {longest.start_s:.1f} s, by up to "
+        f"{longest.beyond_mps * KMH_PER_MPS:.1f} km/h more"
+    )
+
+
+def as_dict(driven: Driven) -> dict[str, Any]:
+    """Everything but the traces, for JSON."""
+    run, q = driven.run, driven.run.quality
+    return {
+        "car": run.car.name,
+        "strategy": driven.strategy,
+        "cycle": run.cycle.name,
+        "step_s": run.step_s,
+        "fuel_l_per_100km": driven.fuel_l_per_100km,
+        "corrected_l_per_100km": driven.corrected_l_per_100km,
+        "bound_l_per_100km": driven.bound_l_per_100km,
+        "nox_mg_per_km": driven.nox_mg_per_km,
+        "soc_end": float(run.soc[-1]),
+        "charge_error": driven.charge_error,
+        "engine_starts": run.starts,
+        "distance_m": run.distance_m,
+        "full_load_s": float(run.full.sum() * run.step_s),
+        "marks": list(driven.marks),
+        "change_percent": driven.change_percent,
+        "difference_percent": dict(driven.difference_percent),
+        "quality": {
+            **{name: _finite(getattr(q, name)) for name in q.__slots__ if name != "violations"},
+            "outside_s": q.outside_s,
+            "violations": [
+                {"start_s": v.start_s, "duration_s": v.duration_s, "beyond_mps": v.beyond_mps}
+                for v in q.violations
+            ],
+        },
+        "energy_j": audit(run),
+        "residual": dict(run.residual),
+        "handling": {
+            part: getattr(run.handling, part)._asdict()
+            for part in ("tyre", "clutch", "shifting", "driver")
+        },
+        "backward": driven.backward.as_dict(),
+    }
+
+
+def steps_frame(run: ForwardRun) -> "pd.DataFrame":
+    """One line per step, units in the names: speeds at its end, powers and torques over it."""
+    import pandas as pd
+
+    words = {
+        motor.REST: "rest",
+        motor.STARTING: "start",
+        motor.TURNING: "turns",
+        motor.STOPPING: "stop",
+    }
+    return pd.DataFrame(
+        {
+            "time_s": run.time_s[1:],
+            "wanted_mps": run.wanted_mps[1:],
+            "speed_end_mps": run.speed_mps[1:],
+            "gear": run.gear,
+            "engine": [words[phase] for phase in run.engine.tolist()],
+            "soc": run.soc[1:],
+            **dict(run.books.flows),
+        }
+    )
+
+
+def _table(title: str, *heads: str) -> Table:
+    table = Table(
+        box=box.SIMPLE_HEAD, title=Text(title, style="table.title"), title_justify="left",
+        collapse_padding=True, pad_edge=False,
+    )  # fmt: skip
+    for n, head in enumerate(heads):
+        words = n == 0 or head.startswith(("status", "to"))
+        table.add_column(head, justify="left" if words else "right", no_wrap=words)
+    return table
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

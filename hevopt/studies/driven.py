@@ -1,0 +1,183 @@
+"""A strategy's plan driven forward, beside its backward twin: what it burns, and where the two differ."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.display.facts import Shown
+from hevopt.driving.cycle import Cycle
+from hevopt.errors import DataError
+from hevopt.forward import _motor_kernels as motor
+from hevopt.forward.lines import line_of
+from hevopt.forward.plans import replay_of
+from hevopt.forward.run import STEP_S, ForwardRun, Handling, follow
+from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.problem import Trajectory
+from hevopt.strategies import strategy_named
+from hevopt.studies.case import Case, prepare
+from hevopt.studies.rows import Row, is_neutral
+from hevopt.studies.settings import Settings
+from hevopt.studies.solved import check_horizon, run_case
+from hevopt.units import litres_per_100km
+
+# Kinds of a cycle's steps, the first that fits.
+KINDS = ("standing", "launch", "change", "braking", "driving")
+_MOVES_MPS = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Driven(Shown):
+    """A forward run and its backward twin.
+
+    backward: the twin's row; fuel_l_per_100km: of the way driven, starts included
+    corrected_l_per_100km: less what stored energy above the asked end charge is worth, at the price of the proof
+    bound_l_per_100km: least of fuel and weighted NOx of any plan that follows the cycle to the same end charge; a
+    car that is driven may fall below it, as it does not follow exactly, and its engine gives its momentum back
+    difference_percent: kind of step -> forward less backward, charge-corrected, as a share of the backward fuel
+    marks: what is to be known of the run beside its figures
+    """
+
+    run: ForwardRun
+    strategy: str
+    backward: Row
+    fuel_l_per_100km: float
+    corrected_l_per_100km: float
+    bound_l_per_100km: float
+    nox_mg_per_km: float | None
+    difference_percent: Mapping[str, float]
+    charge_error: float
+    marks: tuple[str, ...]
+
+    @property
+    def change_percent(self) -> float:
+        """Charge-corrected fuel against the backward twin's."""
+        backward = self.backward.fuel_corrected_l_per_100km
+        return 100 * (self.corrected_l_per_100km / backward - 1) if backward else float("nan")
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "car": self.run.car.name,
+            "strategy": self.strategy,
+            "cycle": self.run.cycle.name,
+            "fuel_l_per_100km": self.fuel_l_per_100km,
+            "change_percent": self.change_percent,
+            "marks": self.marks,
+        }
+
+
+def drive(
+    car: Architecture,
+    cycle: Cycle,
+    strategy: str = "dp",
+    *,
+    settings: Settings | None = None,
+    step_s: float = STEP_S,
+    handling: Handling | None = None,
+) -> Driven:
+    """A strategy's plan of a car on a cycle, driven forward by a driver at the pedals.
+
+    step_s: 0.001 to 0.1 s; handling: tyres, clutch, gear changes and driver
+    A trace that is missed is driven on, and the run says where. DataError for what cannot be driven forward.
+    """
+    settings = replace(settings or Settings(), allow_shortfall=True)
+    check_horizon(settings.horizon_s, [strategy])
+    strategy_named(strategy)
+    line = line_of(car)
+    case = prepare(car, cycle, settings)
+    row, _, trajectory = run_case(case, strategy, settings.horizon_s)
+    plan = replay_of(trajectory, line)
+    run = follow(car, cycle, plan, step_s=step_s, handling=handling, line=line)
+    _check_moved(run)
+    return beside(case, strategy, row, trajectory, run)
+
+
+def beside(case: Case, strategy: str, row: Row, trajectory: Trajectory, run: ForwardRun) -> Driven:
+    """A forward run held against the trajectory that it replays."""
+    car, end_j = run.car, float(run.energy_j[-1])
+    price, surplus_j = case.certificate.price_kgpj, end_j - case.problem.end_min_j
+
+    def litres(mass_kg: float) -> float:
+        return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, run.distance_m)
+
+    km = run.distance_m / 1e3
+    return Driven(
+        run,
+        strategy,
+        row,
+        litres(run.fuel_kg),
+        litres(run.fuel_kg - price * surplus_j),
+        litres(case.certificate.bound_kg(end_j)[0]),
+        run.nox_kg * 1e6 / km if car.engine.nox_known else None,
+        _difference(trajectory, run, price),
+        float(run.soc[-1] - np.interp(run.time_s[-1], case.cycle.time_s, trajectory.soc)),
+        _marks(case, run, surplus_j),
+    )
+
+
+def _check_moved(run: ForwardRun) -> None:
+    moved = run.speed_mps.max()
+    if moved < _MOVES_MPS <= run.wanted_mps.max():
+        k = int(np.argmax(run.wanted_mps > _MOVES_MPS))
+        raise DataError(
+            f"{run.car.name}: the car does not move off at t = {run.time_s[k]:g} s of {run.cycle.name}: engine, "
+            "clutch and tyres give less than mass and slope take; check mass, first gear, grade and clutch"
+        )
+
+
+def _marks(case: Case, run: ForwardRun, surplus_j: float) -> tuple[str, ...]:
+    pack, marks = run.car.battery, []
+    if count := len(run.quality.violations):
+        marks.append(f"trace missed {count} time{'s' if count > 1 else ''}")
+    fuel_j = run.fuel_kg * run.car.engine.heating_value_jpkg
+    if not is_neutral(surplus_j, fuel_j):
+        marks.append("end charge off by more than 1 %")
+    slack = 1e-4 * (pack.soc_max - pack.soc_min)
+    if run.soc.min() < pack.soc_min - slack or run.soc.max() > pack.soc_max + slack:
+        marks.append("charge left its window")
+    if run.books.off_map.any():
+        marks.append(f"outside a measured map for {run.books.off_map.sum() * run.step_s:.1f} s")
+    return tuple(marks)
+
+
+def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> dict[str, float]:
+    """Charge-corrected fuel, forward less backward, by kind of step, in per cent of the backward fuel."""
+    table, flows, books = trajectory.problem.table, trajectory.flows, run.books.flows
+    times = np.append(table.time_s, table.time_s[-1] + table.step_s[-1])
+
+    def per_step(rate: Array) -> Array:
+        summed = np.append(0.0, np.cumsum(np.nan_to_num(rate))) * run.step_s
+        return np.diff(np.interp(times, run.time_s, summed))
+
+    forward = per_step(books["fuel_kgps"] + price_kgpj * books["battery_chemical_w"])
+    starts = np.diff((run.engine == motor.STARTING).astype(float), prepend=0.0) > 0
+    forward += per_step(starts / run.step_s) * run.car.engine.start_fuel_kg
+    backward = trajectory.fuel_kg + price_kgpj * flows["battery_chemical_w"] * table.step_s
+    kinds = kinds_of(trajectory, run, times)
+    total = float(np.sum(trajectory.fuel_kg))
+    gap = 100 * (forward - backward) / total if total > 0 else forward * np.nan
+    return {kind: float(np.sum(gap[kinds == n])) for n, kind in enumerate(KINDS)}
+
+
+def kinds_of(trajectory: Trajectory, run: ForwardRun, times: Array) -> Array:
+    """(time,) number of each step's kind."""
+    signals = trajectory.problem.table.signals
+    assert signals is not None  # replay_of has asked for them
+    books = run.books.flows
+
+    def anywhere(where: Flags) -> Flags:
+        summed = np.append(0.0, np.cumsum(where))
+        found: Flags = np.diff(np.interp(times, run.time_s, summed)) > 0.01
+        return found
+
+    changes = np.diff(run.gear, prepend=run.gear[0]) != 0
+    moving = books["speed_mps"] > 0
+    tests = (
+        signals.speed_mps == 0,
+        anywhere(np.abs(books["clutch_launch_w"]) > 0),
+        anywhere(changes & moving),
+        signals.wheel_power_w < 0,
+        np.ones(len(signals.speed_mps), dtype=bool),
+    )
+    return np.select(tests, range(len(KINDS)))

@@ -1,0 +1,62 @@
+"""`hevopt drive`, as a user runs it."""
+
+import csv
+import json
+
+import pytest
+
+
+def test_a_run_prints_its_twin_the_audit_and_how_it_was_driven(hevopt):
+    seen = hevopt("drive", "C2", "--step", "0.05")
+    assert seen.status == 0, seen.err
+    for word in (
+        "forward",
+        "backward",
+        "bound",
+        "road",
+        "SAE J2951",
+        "by kind of step",
+        "everywhere",
+    ):
+        assert word in seen.out
+
+
+def test_as_json_the_audit_adds_up(hevopt):
+    told = json.loads(hevopt("drive", "D", "--step", "0.05", "--json").out)
+    assert abs(sum(told["energy_j"].values())) < 1e-6 * told["energy_j"]["fuel"]
+    assert told["marks"] == [] and told["backward"]["architecture"] == "D"
+    assert told["quality"]["violations"] == [] and told["handling"]["shifting"]["gap_s"] == 0.5
+    assert sum(told["difference_percent"].values()) == pytest.approx(
+        told["change_percent"], abs=0.1
+    )
+
+
+def test_a_missed_trace_is_told_and_status_3_where_asked(hevopt):
+    words = ("drive", "A", "--strategy", "baseline", "--cycle", "us06", "--step", "0.05")
+    seen = hevopt(*words)
+    assert seen.status == 0 and "trace missed" in seen.out and "trace: left ±2 km/h" in seen.out
+    assert hevopt(*words, "--strict").status == 3
+
+
+def test_steps_are_written_with_units(hevopt, tmp_path):
+    seen = hevopt("drive", "A", "--strategy", "baseline", "--step", "0.1", "--out", "steps.csv")
+    assert seen.status == 0 and "steps written to steps.csv" in seen.out
+    with open(tmp_path / "steps.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 11800
+    assert {"time_s", "speed_end_mps", "gear", "engine", "clutch_loss_w", "tyre_lag_w"} <= set(
+        rows[0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["A", "--step", "1"], "step 1 s; allowed: 0.001 to 0.1 s"),
+        (["A", "--strategy", "fastest"], "fastest"),
+        (["A", "--strategy", "baseline", "--out", "steps.txt"], "suffix '.txt' is unknown"),
+    ],
+)
+def test_bad_input_is_one_message(hevopt, words, message):
+    seen = hevopt("drive", *words)
+    assert seen.status in (2, 3) and message in seen.err and seen.err.count("\n") == 1, seen.err

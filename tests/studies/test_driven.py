@@ -1,0 +1,28 @@
+"""A driven plan beside its backward twin."""
+
+import numpy as np
+import pytest
+from forward.drives import driven
+
+from hevopt.output.driven_tables import audit
+from hevopt.studies.driven import KINDS
+
+
+@pytest.mark.parametrize("name", ["A", "C1", "E"])
+def test_differences_by_kind_of_step_add_up_to_the_whole(name):
+    found = driven(name)
+    assert tuple(found.difference_percent) == KINDS
+    assert sum(found.difference_percent.values()) == pytest.approx(found.change_percent, abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["A", "C1", "E"])
+def test_what_came_in_is_what_went_out(name):
+    found = audit(driven(name).run)
+    assert abs(sum(found.values())) < 1e-9 * found["fuel"]
+
+
+def test_the_bound_is_that_of_the_runs_own_end_charge():
+    found = driven("C2")
+    assert found.bound_l_per_100km == pytest.approx(found.backward.bound_l_per_100km, rel=2e-3)
+    assert found.charge_error == pytest.approx(found.run.soc[-1] - found.backward.soc_end, abs=1e-9)
+    assert np.isfinite(found.change_percent)
