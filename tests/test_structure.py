@@ -41,6 +41,7 @@ BLIND = {
 # Functions above 50 lines, each with its reason.
 LONG = {
     "forward._plant_kernels.step": "one implicit step, compiled as a whole",
+    "forward._drive_kernels.drive": "one loop, compiled as a whole",
     "commands.importing.import_cycle": "a list of options",
     "commands.mapping.import_map": "a list of options",
     "commands.coasting.coastdown": "a list of options",

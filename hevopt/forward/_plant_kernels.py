@@ -103,18 +103,9 @@ def step(
 
 @compiled()
 def _after(
-    body: Body,
-    state: State,
-    inputs: Inputs,
-    pace: Pace,
-    solved: Solved,
-    variant: int,
-    drive: float,
-    top: float,
-    passive: float,
-    rise: float,
-    along: float,
-) -> tuple[State, Outputs]:
+    body: Body, state: State, inputs: Inputs, pace: Pace, solved: Solved, variant: int, drive: float,
+    top: float, passive: float, rise: float, along: float,
+) -> tuple[State, Outputs]:  # fmt: skip
     """State and outputs; where the wheels' speed is a limit's, brakes or the road take what is over."""
     gained = solved.wheel * body.radius_m
     speed = state.speed_mps + gained

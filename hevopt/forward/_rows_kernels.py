@@ -97,15 +97,9 @@ def _mean_rate(rate_before: float, rate_after: float, before: float, after: floa
 
 @compiled()
 def fill_row(
-    ways: Ways,
-    state: State,
-    inputs: Inputs,
-    variant: int,
-    wheel: float,
-    wheel_after: float,
-    side_after: float,
-    row: Array,
-) -> None:
+    ways: Ways, state: State, inputs: Inputs, variant: int, wheel: float, wheel_after: float,
+    side_after: float, row: Array,
+) -> None:  # fmt: skip
     """A row's columns. wheel: speed before the step; after: speeds behind it, as far as known."""
     row[:] = 0.0
     units, joints = len(ways.inertia_kgm2) - 1, ways.load.shape[2]

@@ -104,16 +104,9 @@ def _open(asked: Asked, meets: Meets, limits: Limits) -> float:
 
 @compiled()
 def shared(
-    rows: Array,
-    way: int,
-    variant: int,
-    joints: int,
-    asked: Asked,
-    limits: Limits,
-    closed: bool,
-    launching: bool,
-    machine_nm: Array,
-) -> Shared:
+    rows: Array, way: int, variant: int, joints: int, asked: Asked, limits: Limits, closed: bool,
+    launching: bool, machine_nm: Array,
+) -> Shared:  # fmt: skip
     """Torques of a step; machine_nm: scratch of one value."""
     for _ in range(_TRIES):
         row = rows[way, variant]
