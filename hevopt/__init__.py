@@ -47,6 +47,8 @@ _HOME = {
     "settled_full_load": "hevopt.tipin.study",
     "drive": "hevopt.studies.driven",
     "Driven": "hevopt.studies.driven",
+    "performance": "hevopt.forward.performance",
+    "Performance": "hevopt.forward.performance",
     "Handling": "hevopt.forward.run",
     "coastdown": "hevopt.measured.coastdown.coastdown",
     "HevoptError": "hevopt.errors",

@@ -53,6 +53,7 @@ for command in (
     solving.run,
     solving.table,
     driving.drive,
+    driving.performance,
     listing.strategies,
     reporting.report,
     architectures.validate,

@@ -1,4 +1,4 @@
-"""`hevopt drive`: a car driven forward, by somebody at the pedals."""
+"""`hevopt drive` and `hevopt performance`: cars driven forward, along a trace and at full pedal."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -62,3 +62,70 @@ def drive(
             write(f"steps written to {out}")
     if strict and driven.run.missed:
         raise typer.Exit(_MISSED)
+
+
+def performance(
+    cars: Annotated[str, typer.Argument(help="Names or files of architectures, by commas.")],
+    boost: Annotated[
+        bool, typer.Option("--boost", help="Add a line with e-boost for cars that have it.")
+    ] = False,
+    added_mass: Annotated[float, typer.Option("--added-mass", help="Driver and load, kg.")] = 0.0,
+    gap: Annotated[
+        float | None, typer.Option("--gap", help="Time without torque in a change of gear, s.")
+    ] = None,
+    boost_lag: Annotated[
+        float, typer.Option("--boost-lag", help="Time constant by which full load comes, s.")
+    ] = 0.0,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Tractive-force diagram: .png, .svg or .pdf.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """How fast cars are: from rest, in gear, top speed and slopes, with and without e-boost."""
+    from hevopt.car.handling import Shifting
+    from hevopt.car_files.load import load_architecture
+    from hevopt.commands.terminal import listed
+    from hevopt.errors import DataError
+    from hevopt.forward.performance import performance as figures_of
+    from hevopt.forward.run import Handling
+    from hevopt.output import performance_tables as tables
+
+    loaded = [load_architecture(name) for name in listed(cars) or []]
+    if not loaded:
+        raise DataError("no cars; name architectures, such as A,C2")
+    if plot is not None:
+        _check_plot(plot)
+    handling = Handling() if gap is None else Handling(shifting=Shifting(gap_s=gap))
+    found = []
+    with Progress() as progress:
+        for n, car in enumerate(loaded):
+            progress(car.name, n, len(loaded))
+            for boosts in (False, True) if boost and "e_boost" in car.functions else (False,):
+                found.append(
+                    figures_of(car, boosts=boosts, added_kg=added_mass, boost_lag_s=boost_lag,
+                               handling=handling)
+                )  # fmt: skip
+    if plot is not None:
+        from hevopt.files.writing import write_whole
+        from hevopt.output.force_diagram import force_diagram
+
+        write_whole(plot, force_diagram(found, plot.suffix.lower()[1:]))
+    if json:
+        from json import dumps
+
+        write(dumps({"cars": [tables.as_dict(of) for of in found]}, indent=1, allow_nan=False))
+        return
+    for table in (tables.speed_table, tables.gear_table, tables.limit_table):
+        show(table(found))
+    write(tables.NOTE)
+    if plot is not None:
+        write(f"diagram written to {plot}")
+
+
+def _check_plot(plot: Path) -> None:
+    from hevopt.errors import DataError
+    from hevopt.files.writing import check_writable
+
+    check_writable(plot)
+    if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise DataError(f"--plot {plot}: choose a name that ends in .png, .svg or .pdf")

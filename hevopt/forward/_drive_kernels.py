@@ -21,7 +21,7 @@ from hevopt.forward._lever_kernels import (
     moves_machine,
     resting_lever,
 )
-from hevopt.forward._limits_kernels import Limits, at, electric_w
+from hevopt.forward._limits_kernels import Limits, at, electric_w, share_of_braking
 from hevopt.forward._pedal_kernels import Driver, Pedal, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Inputs, State, Ways, row_length, settled_rows, turning
@@ -34,6 +34,7 @@ from hevopt.forward._share_kernels import (
     shared,
 )
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power_at
+from hevopt.units import STANDARD_GRAVITY_MPS2
 
 Array = NDArray[np.float64]
 
@@ -85,6 +86,7 @@ class Now(NamedTuple):
     k: int
     at_s: float
     energy_j: float
+    side_radps: float
 
 
 @compiled()
@@ -175,6 +177,16 @@ def _acting(
 
 
 @compiled()
+def _friction_nm(car: Car, asked: Asked, speed_mps: float) -> float:
+    """What the friction brakes take at least while the machine may brake as well, at the wheels."""
+    if not asked.braking or asked.wheel_nm >= 0.0:
+        return 0.0
+    weight_n = car.body.mass_kg * STANDARD_GRAVITY_MPS2
+    rate = -asked.wheel_nm / (car.body.radius_m * weight_n)
+    return -asked.wheel_nm * (1.0 - share_of_braking(speed_mps, rate, car.limits))
+
+
+@compiled()
 def _split(
     car: Car,
     rows: Array,
@@ -200,13 +212,17 @@ def _split(
         wheel_nm = asked.wheel_nm + (0.0 if cut else per_nm * pace)
         asked = Asked(wheel_nm, asked.accel, set_nm, low, high, asked.least_nm, asked.most_nm,
                       asked.braking)  # fmt: skip
+    friction = _friction_nm(car, asked, state.speed_mps)
+    asked = Asked(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
+                  asked.least_nm, asked.most_nm, asked.braking)  # fmt: skip
     closed = joint.closing > 0.0
     split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
                    joint.launches, machine_nm)  # fmt: skip
     given = pace if cut else split.machine_nm
     if joint.phase != motor.TURNING and car.ways.side[lever.way, 1] != 0.0:
         given = 0.0
-    return Shared(split.engine_nm, given, split.clutch_nm, split.brake_nm, split.full and not cut)
+    brake = split.brake_nm + friction
+    return Shared(split.engine_nm, given, split.clutch_nm, brake, split.full and not cut)
 
 
 @compiled(nogil=True)
@@ -240,7 +256,7 @@ def drive(car: Car, task: Task, start_j: float, step_s: float, record: Array) ->
                         car.shifting, step_s, keeps_nm)  # fmt: skip
         machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
         machine += car.ways.side[lever.way, 1] * state.side_radps
-        now = Now(k, at_s, energy)
+        now = Now(k, at_s, energy, state.side_radps)
         asked = _asked(car, task, now, state, pedal, lever, machine)
         on = task.engine_on[k] or _called(task, now, state, car.driver)
         phase = motor.phase_after(joint.phase, on, state.side_radps, car.limits.idle_radps)
@@ -258,6 +274,9 @@ def drive(car: Car, task: Task, start_j: float, step_s: float, record: Array) ->
                       * state.speed_mps / car.body.radius_m
                       + car.ways.side[state.way, 1] * state.side_radps)  # fmt: skip
         power = electric_w(split.machine_nm, mean, car.limits) + car.limits.auxiliary_w
+        if phase == motor.STARTING:
+            mean_n = 0.5 * (now.side_radps + state.side_radps)
+            power += max(out.engine_nm * mean_n, 0.0) / car.limits.spin_efficiency
         energy -= step_s * chemical_power_at(power, energy, car.battery)
         stuck = phase == motor.TURNING and joint.closing == 0.0 and not joint.launches
         stuck = stuck or lever.gap_s > 0.0

@@ -18,6 +18,8 @@ class Limits(NamedTuple):
     load_nm: (engine speed,) torque of an alternator that follows the electric load; empty where none does
     low_nm, high_nm: (machine speed,) what machine and battery together allow
     loss_w: (machine speed, torque) from -torque_nm to torque_nm
+    braking_share: (speed of the car, braking force over weight) share of the braking that may pass the machine's
+    axle, over steps of braking_mps and braking_rate; empty where all may
     boosts, regenerates: whether the car's functions let the machine help at full load, and charge while braking
     """
 
@@ -33,6 +35,10 @@ class Limits(NamedTuple):
     idle_radps: float
     engine_max_radps: float
     auxiliary_w: float
+    spin_efficiency: float
+    braking_share: Array
+    braking_mps: float
+    braking_rate: float
     boosts: bool
     regenerates: bool
 
@@ -58,6 +64,21 @@ def smooth_at(values: Array, step: float, x: float) -> float:
         - (t + 1) * t * (t - 2) / 2 * c
         + (t + 1) * t * (t - 1) / 6 * d
     )
+
+
+@compiled()
+def share_of_braking(speed_mps: float, rate: float, limits: Limits) -> float:
+    """Share of the wheels' braking that may pass the machine's axle."""
+    table = limits.braking_share
+    if table.size == 0:
+        return 1.0
+    x = min(speed_mps / limits.braking_mps, table.shape[0] - 1.000001)
+    y = min(rate / limits.braking_rate, table.shape[1] - 1.000001)
+    i, j = int(x), int(y)
+    x, y = x - i, y - j
+    low = table[i, j] + y * (table[i, j + 1] - table[i, j])
+    high = table[i + 1, j] + y * (table[i + 1, j + 1] - table[i + 1, j])
+    return float(low + x * (high - low))
 
 
 @compiled()

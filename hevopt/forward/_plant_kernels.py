@@ -128,7 +128,9 @@ def _after(
         torque = drive - brake + held
         mean = torque / body.radius_m
         left = max(state.force_n, 0.0)
-        force = pace.decay * left + (1.0 - pace.decay) * max(drive - brake, 0.0) / body.radius_m
+        # At rest the force builds up behind what drives until it moves the car.
+        holding = inputs.brake_nm if state.speed_mps == 0.0 else brake
+        force = pace.decay * left + (1.0 - pace.decay) * max(drive - holding, 0.0) / body.radius_m
         speed = 0.0
     else:
         if solved.wheel == top:

@@ -78,7 +78,9 @@ def books_of(
     flows = _driven(car, record, w, n, units, inertia, step_s)
     flows |= _joints(line, record, turning, step_s)
     flows |= _burnt(car, flows)
-    electric = flows["machine_electric_w"] + flows["auxiliary_power_w"]
+    starter = np.maximum(flows["start_w"], 0.0) / car.machines[0].spin_efficiency
+    flows["starter_electric_w"] = starter
+    electric = flows["machine_electric_w"] + flows["auxiliary_power_w"] + starter
     energy_j = trace(
         start[2], np.zeros(len(record)), electric, np.full(len(record), step_s), car.battery.arrays
     )
@@ -195,6 +197,7 @@ def _residuals(f: Mapping[str, Array]) -> dict[str, Array]:
         - f["wheel_power_w"],
         "road": f["wheel_power_w"] - f["tyre_lag_w"] - f["road_w"] - f["kinetic_w"],
         "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
-        "electric bus": f["battery_power_w"] - f["machine_electric_w"] - f["auxiliary_power_w"],
+        "electric bus": f["battery_power_w"] - f["machine_electric_w"] - f["auxiliary_power_w"]
+        - f["starter_electric_w"],
         "battery": f["battery_chemical_w"] - f["battery_power_w"] - f["battery_loss_w"],
     }  # fmt: skip

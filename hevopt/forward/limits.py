@@ -13,6 +13,8 @@ _MACHINE_POINTS = 1201
 _TORQUES = 201
 # Beyond its highest speed by this share an engine is not tabulated, and neither is a machine.
 _BEYOND = 1.2
+# Steps of a table of the braking that a machine may take: speed, and braking force over weight.
+_BRAKING_MPS, _BRAKING_RATE = 0.25, 0.01
 # Machines without a limit of their own are tabulated up to these.
 _FASTEST_RADPS, _STRONGEST_NM = 2e4, 1e4
 
@@ -37,9 +39,20 @@ def limits_of(car: Architecture) -> Limits:
     return Limits(
         _ENGINE_STEP_RADPS, full, least, load, float(machine_speed[1]), low, high, loss, most,
         engine.idle_radps, engine.speed_max_radps, car.vehicle.auxiliary_power_w,
+        machine.spin_efficiency, _braking_share(car), _BRAKING_MPS, _BRAKING_RATE,
         bool(car.functions & {"e_boost", "nox_cut", "power_management"}),
         "regenerative_braking" in car.functions,
     )  # fmt: skip
+
+
+def _braking_share(car: Architecture) -> Array:
+    """(speed, rate) share of the braking that may pass the machine's axle."""
+    braking = car.vehicle.braking
+    if braking is None or "regenerative_braking" not in car.functions:
+        return np.zeros((0, 0))
+    speed = _BRAKING_MPS * np.arange(241, dtype=np.float64)
+    rate = _BRAKING_RATE * np.arange(121, dtype=np.float64)
+    return np.ascontiguousarray(braking.share(speed[:, None], rate[None, :]), dtype=np.float64)
 
 
 def _allowed(car: Architecture, machine: Machine, speed: Array) -> tuple[Array, Array]:

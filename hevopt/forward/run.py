@@ -111,9 +111,9 @@ class ForwardRun(Shown):
 
 
 def shifting_of(car: Architecture) -> Shifting:
-    """Half a second without torque behind one clutch; none where each half of the gears has its own."""
-    gap_s = 0.0 if len(car.driveline.driver_clutches) > 1 else Shifting().gap_s
-    return Shifting(gap_s=gap_s)
+    """The gap of the gearbox's file; none where each half of the gears has a clutch of its own."""
+    own = 0.0 if car.gearbox is None else car.gearbox.shift_gap_s
+    return Shifting(gap_s=0.0 if len(car.driveline.driver_clutches) > 1 else own)
 
 
 def follow(
@@ -138,14 +138,15 @@ def follow(
     count = int(np.ceil(cycle.duration_s / step_s - 1e-9))
     exact_s = cycle.duration_s / count
     record = np.zeros((count, col.COLUMNS))
-    driven = _loop_car(car, line, handling, shifting)
+    driven = loop_car(car, line, handling, shifting)
     start_j = float(plan.energy_j[0])
-    col.drive(driven, _task(cycle, plan), start_j, exact_s, record)
+    col.drive(driven, task_of(cycle, plan), start_j, exact_s, record)
     return _run_of(car, cycle, plan, line, Handling(handling.tyre, handling.clutch, shifting,
                    handling.driver), record, exact_s)  # fmt: skip
 
 
-def _loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifting) -> col.Car:
+def loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifting) -> col.Car:
+    """A car as the compiled loops read it."""
     vehicle, pack = car.vehicle, car.battery
     body = Body(
         float(vehicle.mass_kg), float(vehicle.equivalent_mass_kg), float(vehicle.tyre_radius_m),
@@ -167,7 +168,9 @@ def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
     return a, b, c, d
 
 
-def _task(cycle: Cycle, plan: ForwardPlan) -> col.Task:
+def task_of(cycle: Cycle, plan: ForwardPlan) -> col.Task:
+    """A trace and its plan as the compiled loop reads them."""
+
     def own(values: Array) -> Array:
         return np.array(values, dtype=np.float64)
 

@@ -74,7 +74,7 @@ def audit_table(driven: Driven) -> Table:
 def audit(run: ForwardRun) -> dict[str, float]:
     """Name -> energy that came from there, J; negative where it went there. The sum is 0 up to rounding.
 
-    The starter's work comes from what a start counts in fuel; a loss that is negative (tyre lag) gives.
+    A loss that is negative (tyre lag) gives.
     """
     flows = run.books.flows
 
@@ -82,7 +82,7 @@ def audit(run: ForwardRun) -> dict[str, float]:
         return float(np.nansum(flows[name])) * run.step_s
 
     found = {name: joules(flow) for flow, name in SOURCES.items()}
-    found["starter"] = joules("start_w")
+    found["starter's loss"] = joules("start_w") - joules("starter_electric_w")
     # What is braked at stops comes back out of the shafts as a loss.
     found |= {
         name: joules(flow) if flow == "stop_w" else -joules(flow) for flow, name in SINKS.items()

@@ -153,7 +153,8 @@ def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> d
     forward = per_step(books["fuel_kgps"] + price_kgpj * books["battery_chemical_w"])
     starts = np.diff((run.engine == motor.STARTING).astype(float), prepend=0.0) > 0
     forward += per_step(starts / run.step_s) * run.car.engine.start_fuel_kg
-    backward = trajectory.fuel_kg + price_kgpj * flows["battery_chemical_w"] * table.step_s
+    drained_j = flows["battery_chemical_w"] * table.step_s + trajectory.switch_energy_j
+    backward = trajectory.fuel_kg + price_kgpj * drained_j
     kinds = kinds_of(trajectory, run, times)
     total = float(np.sum(trajectory.fuel_kg))
     gap = 100 * (forward - backward) / total if total > 0 else forward * np.nan

@@ -60,3 +60,30 @@ def test_steps_are_written_with_units(hevopt, tmp_path):
 def test_bad_input_is_one_message(hevopt, words, message):
     seen = hevopt("drive", *words)
     assert seen.status in (2, 3) and message in seen.err and seen.err.count("\n") == 1, seen.err
+
+
+def test_performance_prints_times_and_draws_the_forces(hevopt, tmp_path):
+    seen = hevopt("performance", "A,C2", "--boost", "--plot", "forces.svg")
+    assert seen.status == 0, seen.err
+    for word in ("from rest", "in gear", "top speed and slope", "C2, e-boost", "steady map"):
+        assert word in seen.out
+    drawn = (tmp_path / "forces.svg").read_text()
+    assert drawn.startswith("<?xml") and "nan" not in drawn
+    told = json.loads(hevopt("performance", "C2", "--boost", "--json").out)
+    alone, boosted = told["cars"]
+    assert boosted["to_speed_s"]["100"] < alone["to_speed_s"]["100"]
+    assert alone["repeats_until_empty"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["A", "--added-mass", "9999"], "allowed: -200 to 5000 kg"),
+        (["A", "--gap", "-1"], "gap_s -1; allowed: 0 to 5"),
+        (["A", "--plot", "forces.txt"], "ends in .png, .svg or .pdf"),
+        ([","], "no cars"),
+    ],
+)
+def test_bad_input_of_performance_is_one_message(hevopt, words, message):
+    seen = hevopt("performance", *words)
+    assert seen.status == 2 and message in seen.err and seen.err.count("\n") == 1, seen.err

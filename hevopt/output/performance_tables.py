@@ -1,0 +1,106 @@
+"""How fast cars are, for the terminal and as JSON."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from hevopt.forward.performance import DISTANCES_M, SPEEDS_KMH, SUSTAINED_KMH, Performance
+from hevopt.units import KMH_PER_MPS
+
+# What is to be known beside every figure of the first seconds.
+NOTE = "steady map: a turbocharged engine is slower in the first seconds than this says (hevopt tipin; --boost-lag)"
+
+
+def speed_table(found: Sequence[Performance]) -> Table:
+    """Times from rest to speeds and distances, and what the machine took."""
+    table = _table("from rest, s", *(f"{kmh}\nkm/h" for kmh in SPEEDS_KMH))
+    for distance in DISTANCES_M:
+        table.add_column(f"{distance:g} m\ns", justify="right")
+        table.add_column("at\nkm/h", justify="right")
+    table.add_column("battery\nkJ to 100", justify="right")
+    table.add_column("until\nempty", justify="right")
+    for of in found:
+        cells = [_number(of.to_speed_s[kmh], 2) for kmh in SPEEDS_KMH]
+        for distance in DISTANCES_M:
+            there = of.to_distance[distance]
+            cells += (
+                ["-", "-"]
+                if there is None
+                else [f"{there[0]:.2f}", f"{there[1] * KMH_PER_MPS:.0f}"]
+            )
+        used = of.to_100_j if of.boosts else None
+        cells.append("-" if used is None else f"{used / 1e3:.0f}")
+        cells.append(_number(of.repeats, 1))
+        table.add_row(Text(_name(of)), *cells)
+    return table
+
+
+def gear_table(found: Sequence[Performance]) -> Table:
+    """Times in gear."""
+    cases = list(dict.fromkeys(case for of in found for case in of.in_gear_s))
+    table = _table("in gear, s", *(f"{gear}.\n{low}-{high}" for gear, low, high in cases))
+    for of in found:
+        table.add_row(Text(_name(of)), *(_number(of.in_gear_s.get(case), 2) for case in cases))
+    return table
+
+
+def limit_table(found: Sequence[Performance]) -> Table:
+    """Top speeds of the engine alone, and slopes."""
+    gears = max(len(of.top_mps) for of in found)
+    heads = [f"top {gear}.\nkm/h" for gear in range(1, gears + 1)]
+    heads += ["start\n%", *(f"{kmh} km/h\n%" for kmh in SUSTAINED_KMH)]
+    table = _table("top speed and slope", *heads)
+    for of in found:
+        tops = [_number(_kmh(of.top_mps.get(gear)), 0) for gear in range(1, gears + 1)]
+        slopes = [of.start_slope, *(of.slope[kmh] for kmh in SUSTAINED_KMH)]
+        table.add_row(Text(_name(of)), *tops, *(f"{100 * slope:.1f}" for slope in slopes))
+    return table
+
+
+def as_dict(of: Performance) -> dict[str, Any]:
+    """All figures, for JSON."""
+    return {
+        "car": of.car.name,
+        "e_boost": of.boosts,
+        "mass_kg": of.car.vehicle.mass_kg,
+        "to_speed_s": {str(kmh): time for kmh, time in of.to_speed_s.items()},
+        "to_distance": {
+            f"{distance:g}": None if there is None else {"time_s": there[0], "speed_mps": there[1]}
+            for distance, there in of.to_distance.items()
+        },
+        "in_gear": [
+            {"gear": gear, "from_kmh": low, "to_kmh": high, "time_s": time}
+            for (gear, low, high), time in of.in_gear_s.items()
+        ],
+        "top_mps": {str(gear): top for gear, top in of.top_mps.items()},
+        "start_slope": of.start_slope,
+        "slope": {str(kmh): slope for kmh, slope in of.slope.items()},
+        "battery_to_100_j": of.to_100_j,
+        "repeats_until_empty": of.repeats,
+    }
+
+
+def _name(of: Performance) -> str:
+    return f"{of.car.name}, e-boost" if of.boosts else of.car.name
+
+
+def _kmh(speed_mps: float | None) -> float | None:
+    return None if speed_mps is None else speed_mps * KMH_PER_MPS
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _table(title: str, *heads: str) -> Table:
+    table = Table(
+        box=box.SIMPLE_HEAD, title=Text(title, style="table.title"), title_justify="left",
+        collapse_padding=True, pad_edge=False,
+    )  # fmt: skip
+    table.add_column("car", no_wrap=True)
+    for head in heads:
+        table.add_column(head, justify="right")
+    return table
