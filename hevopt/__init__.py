@@ -46,7 +46,7 @@ _HOME = {
     "tip_in_study": "hevopt.tipin.study",
     "settled_full_load": "hevopt.tipin.study",
     "drive": "hevopt.studies.driven",
-    "Driven": "hevopt.studies.driven",
+    "DrivenPlan": "hevopt.studies.driven",
     "performance": "hevopt.forward.performance",
     "Performance": "hevopt.forward.performance",
     "Handling": "hevopt.forward.run",

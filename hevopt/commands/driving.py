@@ -30,7 +30,7 @@ def drive(
     json: JsonOption = False,
 ) -> None:
     """A strategy's plan driven forward, with driver, clutch and tyres, beside the backward run."""
-    from hevopt.commands.comparing import Job
+    from hevopt.commands.comparing import ComparisonJob
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
     from hevopt.output import driven_tables as tables
@@ -40,7 +40,7 @@ def drive(
     from hevopt.studies.settings import given_of, study_of
 
     settings = study_of(given_of("the command line", given)).settings
-    job = Job(cars_of([architecture], settings), load_cycle(cycle), settings)
+    job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)
     car = job.cars.cars[0]
     if out is not None:
         check_outs({"--out": out}, job.inputs)

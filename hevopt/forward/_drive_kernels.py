@@ -22,11 +22,11 @@ from hevopt.forward._lever_kernels import (
     resting_lever,
 )
 from hevopt.forward._limits_kernels import Limits, at, electric_w, share_of_braking
-from hevopt.forward._pedal_kernels import Driver, Pedal, pressed, remembered, wanted_at
+from hevopt.forward._pedal_kernels import DriverGains, PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Inputs, State, Ways, row_length, settled_rows, turning
 from hevopt.forward._share_kernels import (
-    Asked,
+    AskedStep,
     Shared,
     following_nm,
     machine_range,
@@ -49,7 +49,7 @@ COLUMNS = 20
 _FEEDBACK_SPEED_RADPS = 50.0
 
 
-class Car(NamedTuple):
+class LoopCar(NamedTuple):
     """All that the loop knows of a car."""
 
     body: Body
@@ -60,10 +60,10 @@ class Car(NamedTuple):
     battery: BatteryArrays
     window_j: tuple[float, float]
     shifting: Shifting
-    driver: Driver
+    driver: DriverGains
 
 
-class Task(NamedTuple):
+class LoopTask(NamedTuple):
     """A trace and a plan for it, which holds from each of the trace's times to the next.
 
     time_s, speed_mps, energy_j: (time + 1,); slope_rad, way, engine_on, apart, machine_nm: (time,)
@@ -90,7 +90,7 @@ class Now(NamedTuple):
 
 
 @compiled()
-def _set_nm(car: Car, task: Task, now: Now, state: State, machine_radps: float) -> float:
+def _set_nm(car: LoopCar, task: LoopTask, now: Now, state: State, machine_radps: float) -> float:
     """The machine's set-point: the plan's torque, and what keeps the plan's stored energy."""
     if len(car.limits.load_nm) > 0:
         turns = state.side_radps > 0.3 * car.limits.idle_radps
@@ -103,7 +103,7 @@ def _set_nm(car: Car, task: Task, now: Now, state: State, machine_radps: float) 
 
 
 @compiled()
-def _called(task: Task, now: Now, state: State, driver: Driver) -> bool:
+def _called(task: LoopTask, now: Now, state: State, driver: DriverGains) -> bool:
     """Whether an engine that the car will move off with is started: so early that it turns by then."""
     k = now.k + 1
     if state.speed_mps > 0.0 or k >= len(task.engine_on) or not task.engine_on[k]:
@@ -113,8 +113,14 @@ def _called(task: Task, now: Now, state: State, driver: Driver) -> bool:
 
 @compiled()
 def _asked(
-    car: Car, task: Task, now: Now, state: State, pedal: Pedal, lever: Lever, machine_radps: float
-) -> Asked:
+    car: LoopCar,
+    task: LoopTask,
+    now: Now,
+    state: State,
+    pedal: PedalState,
+    lever: Lever,
+    machine_radps: float,
+) -> AskedStep:
     """What the driver and the plan ask of engine and machine."""
     limits, radius = car.limits, car.body.radius_m
     low, high = machine_range(machine_radps, limits)
@@ -130,14 +136,14 @@ def _asked(
     braking = pedal.force_n < 0.0
     accel = 0.0 if pedal.holds else pedal.accel_mps2 / radius
     wheel_nm = 0.0 if pedal.holds else pedal.force_n * radius
-    return Asked(wheel_nm, accel, set_nm, low, high, least, most, braking)
+    return AskedStep(wheel_nm, accel, set_nm, low, high, least, most, braking)
 
 
 @compiled()
 def _acting(
-    car: Car,
+    car: LoopCar,
     state: State,
-    pedal: Pedal,
+    pedal: PedalState,
     joint: motor.Joined,
     lever: Lever,
     split: Shared,
@@ -177,7 +183,7 @@ def _acting(
 
 
 @compiled()
-def _friction_nm(car: Car, asked: Asked, speed_mps: float) -> float:
+def _friction_nm(car: LoopCar, asked: AskedStep, speed_mps: float) -> float:
     """What the friction brakes take at least while the machine may brake as well, at the wheels."""
     if not asked.braking or asked.wheel_nm >= 0.0:
         return 0.0
@@ -188,10 +194,10 @@ def _friction_nm(car: Car, asked: Asked, speed_mps: float) -> float:
 
 @compiled()
 def _split(
-    car: Car,
+    car: LoopCar,
     rows: Array,
     state: State,
-    asked: Asked,
+    asked: AskedStep,
     joint: motor.Joined,
     lever: Lever,
     machine_nm: Array,
@@ -210,10 +216,10 @@ def _split(
         low, high = (0.0, 0.0) if cut else (asked.low_nm, asked.high_nm)
         set_nm = 0.0 if cut else min(max(asked.set_nm + pace, low), high)
         wheel_nm = asked.wheel_nm + (0.0 if cut else per_nm * pace)
-        asked = Asked(wheel_nm, asked.accel, set_nm, low, high, asked.least_nm, asked.most_nm,
+        asked = AskedStep(wheel_nm, asked.accel, set_nm, low, high, asked.least_nm, asked.most_nm,
                       asked.braking)  # fmt: skip
     friction = _friction_nm(car, asked, state.speed_mps)
-    asked = Asked(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
+    asked = AskedStep(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
                   asked.least_nm, asked.most_nm, asked.braking)  # fmt: skip
     closed = joint.closing > 0.0
     split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
@@ -226,7 +232,7 @@ def _split(
 
 
 @compiled(nogil=True)
-def drive(car: Car, task: Task, start_j: float, step_s: float, record: Array) -> None:
+def drive(car: LoopCar, task: LoopTask, start_j: float, step_s: float, record: Array) -> None:
     """Drive a trace; record: (step, column), filled."""
     pace, rows = pace_of(step_s, car.body.tyre.lag_s), settled_rows(car.ways)
     scratch, machine_nm = np.empty(row_length(car.ways)), np.zeros(1)
@@ -235,7 +241,7 @@ def drive(car: Car, task: Task, start_j: float, step_s: float, record: Array) ->
     turns = car.ways.wheel[task.way[0], output] * task.speed_mps[0] / car.body.radius_m
     side = max(car.limits.idle_radps, turns) if on else 0.0
     state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0)
-    lever, pedal = resting_lever(task.way[0]), Pedal(0.0, 0.0, 0.0, 0.0, True)
+    lever, pedal = resting_lever(task.way[0]), PedalState(0.0, 0.0, 0.0, 0.0, True)
     joint = motor.Joined(motor.TURNING if on else motor.REST, 1.0 if side == turns else 0.0, False, 0,
                          car.limits.idle_radps)  # fmt: skip
     energy, k = start_j, 0

@@ -7,7 +7,7 @@ from hevopt.forward._contact_kernels import Body, resistance
 from hevopt.forward._rows_kernels import Array
 
 
-class Driver(NamedTuple):
+class DriverGains(NamedTuple):
     """A PID on the speed with feed-forward of acceleration and resistance; gains count per mass of the car.
 
     F = feed_forward [m_eq a + F_res(v)] of the trace + m (proportional e + derivative de/dt + ∫ integral e dt)
@@ -30,7 +30,7 @@ class Driver(NamedTuple):
     charge_per_s: float = 0.2
 
 
-class Pedal(NamedTuple):
+class PedalState(NamedTuple):
     """What the driver remembers, the integral as a force, and asks for: force at the tyres, acceleration, rest."""
 
     integral_n: float
@@ -56,19 +56,19 @@ def wanted_at(time_s: Array, speed_mps: Array, at_s: float, k: int) -> float:
 
 @compiled()
 def pressed(
-    pedal: Pedal,
+    pedal: PedalState,
     now: float,
     ahead: float,
     speed: float,
     slope_rad: float,
     body: Body,
-    driver: Driver,
+    driver: DriverGains,
     step_s: float,
-) -> Pedal:
+) -> PedalState:
     """The pedal for a step: now and ahead are the trace's speeds at its ends."""
     error = now - speed
     if ahead <= _STANDSTILL_MPS and now <= _STANDSTILL_MPS and speed < driver.hold_mps:
-        return Pedal(0.0, error, -_HOLD_MPS2 * body.mass_kg, 0.0, True)
+        return PedalState(0.0, error, -_HOLD_MPS2 * body.mass_kg, 0.0, True)
     accel = (ahead - now) / step_s
     passive, _, along = resistance(0.5 * (now + ahead), slope_rad, body)
     force = driver.feed_forward * (body.equivalent_kg * accel + passive + along) + pedal.integral_n
@@ -78,15 +78,17 @@ def pressed(
     most = body.tyre.friction * body.mass_kg * 9.80665
     force = min(max(force, -most), most)
     passive, _, along = resistance(speed, slope_rad, body)
-    return Pedal(
+    return PedalState(
         pedal.integral_n, error, force, (force - passive - along) / body.equivalent_kg, False
     )
 
 
 @compiled()
-def remembered(pedal: Pedal, frozen: bool, body: Body, driver: Driver, step_s: float) -> Pedal:
+def remembered(
+    pedal: PedalState, frozen: bool, body: Body, driver: DriverGains, step_s: float
+) -> PedalState:
     """The integral after a step, as it was where the car could not follow in its sense."""
     if frozen or pedal.holds:
         return pedal
     grown = pedal.integral_n + step_s * body.mass_kg * driver.integral * pedal.error_mps
-    return Pedal(grown, pedal.error_mps, pedal.force_n, pedal.accel_mps2, pedal.holds)
+    return PedalState(grown, pedal.error_mps, pedal.force_n, pedal.accel_mps2, pedal.holds)

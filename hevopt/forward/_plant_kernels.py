@@ -19,7 +19,7 @@ import numpy as np
 from hevopt._compile import compiled
 from hevopt.forward._contact_kernels import Body, Pace, grip_n, resistance
 from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, turning
-from hevopt.forward._solve_kernels import Motion, Solved, directions, reached, solve, sums
+from hevopt.forward._solve_kernels import Motion, SolvedStep, directions, reached, solve, sums
 
 # Rounds of guessing the directions of power; each flips those that proved wrong.
 _ROUNDS = 8
@@ -81,7 +81,7 @@ def step(
             free = solved
             solved = solve(s, rest, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                             inputs.capacity_nm)  # fmt: skip
-            solved = Solved(rest.rest, *solved[1:])
+            solved = SolvedStep(rest.rest, *solved[1:])
             if free.wheel > top and reached(s, motion, solved) < motion.own * top:
                 solved = free
         found = directions(
@@ -103,7 +103,7 @@ def step(
 
 @compiled()
 def _after(
-    body: Body, state: State, inputs: Inputs, pace: Pace, solved: Solved, variant: int, drive: float,
+    body: Body, state: State, inputs: Inputs, pace: Pace, solved: SolvedStep, variant: int, drive: float,
     top: float, passive: float, rise: float, along: float,
 ) -> tuple[State, Outputs]:  # fmt: skip
     """State and outputs; where the wheels' speed is a limit's, brakes or the road take what is over."""

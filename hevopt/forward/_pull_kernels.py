@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hevopt._compile import compiled
 from hevopt.forward._contact_kernels import clutch_capacity_nm, pace_of, resistance
-from hevopt.forward._drive_kernels import Car
+from hevopt.forward._drive_kernels import LoopCar
 from hevopt.forward._lever_kernels import changed, keeping_pace_nm, moves_machine, resting_lever
 from hevopt.forward._limits_kernels import at, electric_w
 from hevopt.forward._plant_kernels import step
@@ -37,7 +37,9 @@ class Foot(NamedTuple):
 
 
 @compiled()
-def _machine_nm(car: Car, foot: Foot, side_radps: float, speed: float, energy_j: float) -> float:
+def _machine_nm(
+    car: LoopCar, foot: Foot, side_radps: float, speed: float, energy_j: float
+) -> float:
     """The machine's torque: what the load needs of an alternator, all it has where it helps."""
     if len(car.limits.load_nm) > 0:
         return following_nm(side_radps, car.limits)
@@ -48,7 +50,7 @@ def _machine_nm(car: Car, foot: Foot, side_radps: float, speed: float, energy_j:
 
 @compiled(nogil=True)
 def pull(
-    car: Car, by_gear: NDArray[np.int64], foot: Foot, start: tuple[float, int, float],
+    car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, start: tuple[float, int, float],
     step_s: float, record: Array,
 ) -> None:  # fmt: skip
     """Fill the record, (step, column); by_gear: way of every gear; start: speed, place in it, stored energy."""

@@ -12,7 +12,7 @@ from hevopt._compile import compiled
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._limits_kernels import Limits, at, smooth_at
 from hevopt.forward._rows_kernels import Array
-from hevopt.forward._solve_kernels import Solved, directions
+from hevopt.forward._solve_kernels import SolvedStep, directions
 
 _TRIES = 4
 # Share of its highest torque with which a rotor is brought along where machine and battery allow none.
@@ -29,7 +29,7 @@ class Shared(NamedTuple):
     full: bool
 
 
-class Asked(NamedTuple):
+class AskedStep(NamedTuple):
     """What a step shall do: torque at the wheels and acceleration of the wheels; and what limits it.
 
     set_nm, low_nm, high_nm: the machine's set-point and limits; least_nm, most_nm: the engine's
@@ -73,7 +73,7 @@ def _clip(value: float, low: float, high: float) -> float:
 
 
 @compiled()
-def _closed(asked: Asked, meets: Meets, limits: Limits) -> tuple[float, float]:
+def _closed(asked: AskedStep, meets: Meets, limits: Limits) -> tuple[float, float]:
     """Torques of engine and machine with the clutch closed."""
     machine, need = asked.set_nm, asked.wheel_nm - meets.c0
     if asked.braking and limits.regenerates and meets.cm > 0.0:
@@ -94,7 +94,7 @@ def _closed(asked: Asked, meets: Meets, limits: Limits) -> tuple[float, float]:
 
 
 @compiled()
-def _open(asked: Asked, meets: Meets, limits: Limits) -> float:
+def _open(asked: AskedStep, meets: Meets, limits: Limits) -> float:
     """The machine's torque with the clutch open."""
     if meets.cm <= 0.0:
         return asked.set_nm
@@ -104,7 +104,7 @@ def _open(asked: Asked, meets: Meets, limits: Limits) -> float:
 
 @compiled()
 def shared(
-    rows: Array, way: int, variant: int, joints: int, asked: Asked, limits: Limits, closed: bool,
+    rows: Array, way: int, variant: int, joints: int, asked: AskedStep, limits: Limits, closed: bool,
     launching: bool, machine_nm: Array,
 ) -> Shared:  # fmt: skip
     """Torques of a step; machine_nm: scratch of one value."""
@@ -135,7 +135,7 @@ def shared(
         else:
             machine, side_accel = _open(asked, meets, limits), 0.0
         machine_nm[0] = machine
-        solved = Solved(asked.accel, side_accel, engine, clutch, closed)
+        solved = SolvedStep(asked.accel, side_accel, engine, clutch, closed)
         found = directions(row, joints, variant, machine_nm, solved, 1.0, 1.0, 1.0)
         if found == variant:
             break

@@ -43,7 +43,7 @@ class Motion(NamedTuple):
     per_nm: float
 
 
-class Solved(NamedTuple):
+class SolvedStep(NamedTuple):
     """Changes of both speeds, and the torques of engine and clutch."""
 
     wheel: float
@@ -67,18 +67,20 @@ def sums(row: Array, machine_nm: Array, brake_nm: float, slip: float, per_s: flo
 
 
 @compiled()
-def _free(s: Sums, motion: Motion, engine_nm: float, clutch_nm: float) -> Solved:
+def _free(s: Sums, motion: Motion, engine_nm: float, clutch_nm: float) -> SolvedStep:
     """Both changes for given torques."""
     own = motion.own + motion.per_nm * s.per_w
     across = motion.per_nm * s.per_n
     right = motion.rest + motion.per_nm * (s.known + s.engine * engine_nm + s.clutch * clutch_nm)
     below = s.side_known + s.side_engine * engine_nm - clutch_nm
     wheel = (right * s.side_per_n - across * below) / (own * s.side_per_n - across * s.side_per_w)
-    return Solved(wheel, (below - s.side_per_w * wheel) / s.side_per_n, engine_nm, clutch_nm, False)
+    return SolvedStep(
+        wheel, (below - s.side_per_w * wheel) / s.side_per_n, engine_nm, clutch_nm, False
+    )
 
 
 @compiled()
-def _locked(s: Sums, motion: Motion, engine_nm: float) -> Solved:
+def _locked(s: Sums, motion: Motion, engine_nm: float) -> SolvedStep:
     """Both changes and the clutch's torque where no slip is left after the step."""
     inner = s.side_per_w + s.side_per_n * s.ratio
     through = s.side_known + s.side_engine * engine_nm + s.side_per_n * s.slip
@@ -87,11 +89,11 @@ def _locked(s: Sums, motion: Motion, engine_nm: float) -> Solved:
         s.known + s.engine * engine_nm + s.per_n * s.slip + s.clutch * through
     )
     wheel = right / own
-    return Solved(wheel, s.ratio * wheel - s.slip, engine_nm, through - inner * wheel, True)
+    return SolvedStep(wheel, s.ratio * wheel - s.slip, engine_nm, through - inner * wheel, True)
 
 
 @compiled()
-def _governed(s: Sums, motion: Motion, side: float, clutch_nm: float) -> Solved:
+def _governed(s: Sums, motion: Motion, side: float, clutch_nm: float) -> SolvedStep:
     """The wheels' change and the engine's torque for a given change of its side."""
     over = s.engine / s.side_engine
     given = s.side_per_n * side - s.side_known + clutch_nm
@@ -100,11 +102,11 @@ def _governed(s: Sums, motion: Motion, side: float, clutch_nm: float) -> Solved:
         s.known - s.per_n * side + over * given + s.clutch * clutch_nm
     )
     wheel = right / own
-    return Solved(wheel, side, (s.side_per_w * wheel + given) / s.side_engine, clutch_nm, False)
+    return SolvedStep(wheel, side, (s.side_per_w * wheel + given) / s.side_engine, clutch_nm, False)
 
 
 @compiled()
-def reached(s: Sums, motion: Motion, solved: Solved) -> float:
+def reached(s: Sums, motion: Motion, solved: SolvedStep) -> float:
     """The right-hand side of the wheels' equation with the torques of a solution.
 
     A clutch that slips without the grip's limit and holds with it would leave less than the limit: between the two
@@ -124,7 +126,7 @@ def solve(
     low_nm: float,
     high_nm: float,
     capacity_nm: float,
-) -> Solved:
+) -> SolvedStep:
     """Locked where the clutch can, else slipping at its capacity, the engine governed as far as its torque goes.
 
     governed: change of its side's speed, NaN for an engine that gives what is asked
@@ -154,7 +156,7 @@ def solve(
 
 @compiled()
 def joint_torque_nm(
-    row: Array, joint: int, machine_nm: Array, solved: Solved, per_s: float
+    row: Array, joint: int, machine_nm: Array, solved: SolvedStep, per_s: float
 ) -> float:
     """Torque that enters a lossy joint."""
     at = (
@@ -182,7 +184,7 @@ def directions(
     joints: int,
     variant: int,
     machine_nm: Array,
-    solved: Solved,
+    solved: SolvedStep,
     mean_wheel: float,
     mean_side: float,
     per_s: float,

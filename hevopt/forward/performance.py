@@ -10,7 +10,7 @@ from hevopt.car.handling import check_ranges
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.forward import _pull_kernels as col
-from hevopt.forward._drive_kernels import Car
+from hevopt.forward._drive_kernels import LoopCar
 from hevopt.forward._pull_kernels import Foot
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.run import Handling, loop_car, shifting_of
@@ -89,16 +89,8 @@ def performance(
     boost_lag_s: time constant by which full load comes, 0 for a steady map, which is too quick in the first seconds
     DataError for a car whose driveline cannot be driven forward, and for boost that its functions lack.
     """
-    if boosts and "e_boost" not in car.functions:
-        raise DataError(f"{car.name}: e_boost is none of this car's functions; leave --boost out")
-    if not -200 <= added_kg <= 5000 or not 0 <= boost_lag_s <= 10:
-        raise DataError(
-            f"added mass {added_kg:g} kg, boost lag {boost_lag_s:g} s; allowed: -200 to 5000 kg, 0 to 10 s"
-        )
     handling = handling or Handling()
-    for part in (handling.tyre, handling.clutch, handling.shifting):
-        if part is not None:
-            check_ranges(part)
+    _check(car, boosts, added_kg, boost_lag_s, handling)
     heavy = replace(car.vehicle, mass_kg=car.vehicle.mass_kg + added_kg)
     car, line = replace(car, vehicle=heavy), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
@@ -116,11 +108,7 @@ def performance(
     curves = forces_of(car, line, driven, boosts)
     engine = forces_of(car, line, driven, False)
     to_100 = _first(trace[:, col.SPEED], 100 / KMH_PER_MPS)
-    used = (
-        None
-        if to_100 is None
-        else start_j - float(np.interp(to_100, _times(trace), trace[:, col.ENERGY]))
-    )
+    used = None if to_100 is None else start_j - _stored_j(trace, to_100)
     window = start_j - float(energy_j(car.battery, car.battery.soc_min))
     return Performance(
         car,
@@ -138,6 +126,20 @@ def performance(
     )
 
 
+def _check(
+    car: Architecture, boosts: bool, added_kg: float, boost_lag_s: float, handling: Handling
+) -> None:
+    if boosts and "e_boost" not in car.functions:
+        raise DataError(f"{car.name}: e_boost is none of this car's functions; leave --boost out")
+    if not -200 <= added_kg <= 5000 or not 0 <= boost_lag_s <= 10:
+        raise DataError(
+            f"added mass {added_kg:g} kg, boost lag {boost_lag_s:g} s; allowed: -200 to 5000 kg, 0 to 10 s"
+        )
+    for part in (handling.tyre, handling.clutch, handling.shifting):
+        if part is not None:
+            check_ranges(part)
+
+
 def _by_gear(line: Line) -> Indices:
     """The way of each gear at full pedal: where the machine has gears of its own, the next one not below."""
     found = []
@@ -149,10 +151,16 @@ def _by_gear(line: Line) -> Indices:
     return np.array(found, dtype=np.int64)
 
 
-def _pulled(driven: Car, by_gear: Indices, foot: Foot, start: tuple[float, int, float]) -> Array:
+def _pulled(
+    driven: LoopCar, by_gear: Indices, foot: Foot, start: tuple[float, int, float]
+) -> Array:
     record: Array = np.zeros((round(_LONGEST_S / STEP_S), col.COLUMNS))
     col.pull(driven, by_gear, foot, start, STEP_S, record)
     return record
+
+
+def _stored_j(trace: Array, at_s: float) -> float:
+    return float(np.interp(at_s, _times(trace), trace[:, col.ENERGY]))
 
 
 def _times(trace: Array) -> Array:
@@ -178,7 +186,7 @@ def _at_distance(trace: Array, distance_m: float) -> tuple[float, float] | None:
 
 
 def _in_gear(
-    driven: Car, by_gear: Indices, foot: Foot, start_j: float
+    driven: LoopCar, by_gear: Indices, foot: Foot, start_j: float
 ) -> dict[tuple[int, int, int], float | None]:
     """Times from third gear on, and 40 to 80 km/h in fourth; None where the engine turns too slowly or fast."""
     held = foot._replace(up_radps=np.inf)
@@ -200,7 +208,7 @@ def _in_gear(
     return found
 
 
-def forces_of(car: Architecture, line: Line, driven: Car, boosts: bool) -> Curves:
+def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> Curves:
     """Highest force in each gear at steady speed, engine at full load, the machine's as well where it helps."""
     ways, radius, limits = line.ways, car.vehicle.tyre_radius_m, driven.limits
     speed = np.linspace(0.1, 300 / KMH_PER_MPS, 1200)
@@ -255,7 +263,7 @@ def _slope(car: Architecture, curves: Curves, speed_mps: float, handling: Handli
     return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
 
 
-def _start_slope(car: Architecture, driven: Car, handling: Handling) -> float:
+def _start_slope(car: Architecture, driven: LoopCar, handling: Handling) -> float:
     """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip."""
     limits, ways = driven.limits, driven.ways
     launch = LAUNCH_RPM / RPM_PER_RADPS

@@ -14,7 +14,7 @@ from hevopt.errors import DataError
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward._contact_kernels import Body
-from hevopt.forward._pedal_kernels import Driver
+from hevopt.forward._pedal_kernels import DriverGains
 from hevopt.forward.books import Books, books_of
 from hevopt.forward.limits import limits_of
 from hevopt.forward.lines import Line, line_of
@@ -24,7 +24,7 @@ from hevopt.forward.stability import check_gains
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import energy_j, soc
 
-_Part = TypeVar("_Part", Tyre, Clutch, Shifting, Driver)
+_Part = TypeVar("_Part", Tyre, Clutch, Shifting, DriverGains)
 STEP_S = 0.01
 STEP_RANGE_S = (0.001, 0.1)
 STEPS_MAX = 20_000_000
@@ -36,7 +36,7 @@ class Handling(NamedTuple):
     tyre: Tyre = Tyre()
     clutch: Clutch = Clutch()
     shifting: Shifting | None = None
-    driver: Driver = Driver()
+    driver: DriverGains = DriverGains()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -145,7 +145,7 @@ def follow(
                    handling.driver), record, exact_s)  # fmt: skip
 
 
-def loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifting) -> col.Car:
+def loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifting) -> col.LoopCar:
     """A car as the compiled loops read it."""
     vehicle, pack = car.vehicle, car.battery
     body = Body(
@@ -154,7 +154,7 @@ def loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifti
         _floats(handling.clutch),
     )  # fmt: skip
     low, high = (float(energy_j(pack, end)) for end in (pack.soc_min, pack.soc_max))
-    return col.Car(body, line.ways, line.fast_way, line.fast_radps, limits_of(car), pack.arrays,
+    return col.LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car), pack.arrays,
                    (low, high), _floats(shifting), _floats(handling.driver))  # fmt: skip
 
 
@@ -168,13 +168,13 @@ def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
     return a, b, c, d
 
 
-def task_of(cycle: Cycle, plan: ForwardPlan) -> col.Task:
+def task_of(cycle: Cycle, plan: ForwardPlan) -> col.LoopTask:
     """A trace and its plan as the compiled loop reads them."""
 
     def own(values: Array) -> Array:
         return np.array(values, dtype=np.float64)
 
-    return col.Task(
+    return col.LoopTask(
         own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), plan.way,
         plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j,
     )  # fmt: skip

@@ -5,10 +5,10 @@ import numpy as np
 from hevopt.car.handling import Tyre
 from hevopt.errors import DataError
 from hevopt.forward._contact_kernels import pace_of
-from hevopt.forward._pedal_kernels import Driver
+from hevopt.forward._pedal_kernels import DriverGains
 
 
-def spectral_radius(driver: Driver, tyre: Tyre, step_s: float) -> float:
+def spectral_radius(driver: DriverGains, tyre: Tyre, step_s: float) -> float:
     """Largest eigenvalue of a step of driver, tyre and car, per mass; the loop is unstable above 1.
 
     States are speed, force, integral and the speed before:  f = -Kp v - Kd (v - v_before)/h + I,  then the tyre's
@@ -26,7 +26,7 @@ def spectral_radius(driver: Driver, tyre: Tyre, step_s: float) -> float:
     return float(np.abs(np.linalg.eigvals(np.stack([moved, force, integral, speed]))).max())
 
 
-def check_gains(driver: Driver, tyre: Tyre, step_s: float) -> None:
+def check_gains(driver: DriverGains, tyre: Tyre, step_s: float) -> None:
     """DataError for gains out of range, or with which the speed would swing ever more."""
     for name, value in driver._asdict().items():
         if not 0 <= value <= 1000:  # nor NaN

@@ -10,7 +10,7 @@ from rich.text import Text
 from hevopt.files.shown import printable
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.run import ForwardRun
-from hevopt.studies.driven import Driven
+from hevopt.studies.driven import DrivenPlan
 from hevopt.units import KMH_PER_MPS
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ SINKS = {
 _TINY_J = 0.5
 
 
-def twin_table(driven: Driven) -> Table:
+def twin_table(driven: DrivenPlan) -> Table:
     """The run, its backward twin and the bound of that."""
     run, back = driven.run, driven.backward
     title = f"{run.car.name}, {driven.strategy} on {run.cycle.name}"
@@ -57,7 +57,7 @@ def twin_table(driven: Driven) -> Table:
     return table
 
 
-def audit_table(driven: Driven) -> Table:
+def audit_table(driven: DrivenPlan) -> Table:
     """Where the energy came from and where it went."""
     table = _table("energy, kJ", "from\n", "\nkJ", "to\n", "\nkJ")
     given = [(name, value) for name, value in audit(driven.run).items() if value > _TINY_J]
@@ -92,7 +92,7 @@ def audit(run: ForwardRun) -> dict[str, float]:
     return found
 
 
-def notes(driven: Driven) -> str:
+def notes(driven: DrivenPlan) -> str:
     """Drive quality, where the trace was left, and what the difference is made of."""
     run, q = driven.run, driven.run.quality
     lines = [
@@ -125,7 +125,7 @@ def trace_text(run: ForwardRun) -> str:
     )
 
 
-def as_dict(driven: Driven) -> dict[str, Any]:
+def as_dict(driven: DrivenPlan) -> dict[str, Any]:
     """Everything but the traces, for JSON."""
     run, q = driven.run, driven.run.quality
     return {

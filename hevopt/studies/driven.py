@@ -28,7 +28,7 @@ _MOVES_MPS = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Driven(Shown):
+class DrivenPlan(Shown):
     """A forward run and its backward twin.
 
     backward: the twin's row; fuel_l_per_100km: of the way driven, starts included
@@ -75,7 +75,7 @@ def drive(
     settings: Settings | None = None,
     step_s: float = STEP_S,
     handling: Handling | None = None,
-) -> Driven:
+) -> DrivenPlan:
     """A strategy's plan of a car on a cycle, driven forward by a driver at the pedals.
 
     step_s: 0.001 to 0.1 s; handling: tyres, clutch, gear changes and driver
@@ -93,7 +93,9 @@ def drive(
     return beside(case, strategy, row, trajectory, run)
 
 
-def beside(case: Case, strategy: str, row: Row, trajectory: Trajectory, run: ForwardRun) -> Driven:
+def beside(
+    case: Case, strategy: str, row: Row, trajectory: Trajectory, run: ForwardRun
+) -> DrivenPlan:
     """A forward run held against the trajectory that it replays."""
     car, end_j = run.car, float(run.energy_j[-1])
     price, surplus_j = case.certificate.price_kgpj, end_j - case.problem.end_min_j
@@ -102,7 +104,7 @@ def beside(case: Case, strategy: str, row: Row, trajectory: Trajectory, run: For
         return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, run.distance_m)
 
     km = run.distance_m / 1e3
-    return Driven(
+    return DrivenPlan(
         run,
         strategy,
         row,

@@ -8,7 +8,7 @@ from forward.drives import STIFF, constant, driven, follow, plan_of, ramp
 
 from hevopt import DataError, drive, load_architecture
 from hevopt.car.handling import Clutch, Shifting, Tyre
-from hevopt.forward._pedal_kernels import Driver
+from hevopt.forward._pedal_kernels import DriverGains
 from hevopt.forward.run import Handling
 from hevopt.forward.stability import spectral_radius
 from hevopt.problem.battery import soc
@@ -60,7 +60,7 @@ def test_the_length_of_the_step_moves_fuel_by_less_than_a_fiftieth_of_a_per_cent
 )
 def test_at_constant_speed_all_flows_are_those_of_the_backward_step(name, speed_kmh):
     car, cycle = load_architecture(name), constant(speed_kmh)
-    open_loop = Handling(driver=Driver(charge_per_s=0.0))
+    open_loop = Handling(driver=DriverGains(charge_per_s=0.0))
     strategy = "baseline" if name == "A" else "dp"
     run = drive(car, cycle, strategy, handling=open_loop).run
     from hevopt.studies.case import prepare
@@ -112,7 +112,7 @@ def test_ten_seconds_more_at_rest_cost_idling_only():
 
 def test_a_lazy_driver_leaves_the_trace_and_the_run_says_where():
     car, cycle, plan, _ = plan_of("A")
-    lazy = Driver(proportional=0.5, integral=0.05, feed_forward=0.0)
+    lazy = DriverGains(proportional=0.5, integral=0.05, feed_forward=0.0)
     run = follow(car, cycle, plan, handling=Handling(driver=lazy))
     assert run.missed and run.quality.outside_s > 20
     assert all(0 <= one.start_s <= 1180 and one.beyond_mps > 0 for one in run.quality.violations)
@@ -127,12 +127,16 @@ def test_a_cycle_that_asks_for_more_than_the_car_has_is_driven_on_and_marked():
 
 def test_gains_that_make_the_speed_swing_are_refused_with_the_factor():
     tyre = Tyre()
-    assert spectral_radius(Driver(), tyre, 0.01) < 1 < spectral_radius(Driver(250.0), tyre, 0.01)
+    assert (
+        spectral_radius(DriverGains(), tyre, 0.01)
+        < 1
+        < spectral_radius(DriverGains(250.0), tyre, 0.01)
+    )
     car, cycle, plan, _ = plan_of("A")
     with pytest.raises(DataError, match=r"swings ever more.*lower proportional"):
-        follow(car, cycle, plan, handling=Handling(driver=Driver(250.0)))
+        follow(car, cycle, plan, handling=Handling(driver=DriverGains(250.0)))
     with pytest.raises(DataError, match="integral -1; allowed"):
-        follow(car, cycle, plan, handling=Handling(driver=Driver(integral=-1.0)))
+        follow(car, cycle, plan, handling=Handling(driver=DriverGains(integral=-1.0)))
 
 
 @pytest.mark.parametrize("step_s", [0.0, 0.2, float("nan")])
