@@ -99,6 +99,13 @@ def _drain_w(pack: Battery, power: float, energy: np.ndarray) -> np.ndarray:
     return result
 
 
+def switching_rows(table: ControlTable, order: np.ndarray | slice) -> dict[str, np.ndarray]:
+    """What switching takes in some steps of a table, by the names of its fields."""
+    names = ("switch_fuel_kg", "switch_energy_j", "switch_allowed")
+    matrices = {name: getattr(table, name) for name in names}
+    return {name: m if m.ndim == 2 else m[order] for name, m in matrices.items()}
+
+
 def rows(problem: Problem, order: np.ndarray) -> Problem:
     """The problem with other rows, in the order given; start times and missing torque left out of it."""
     table = problem.table
@@ -112,6 +119,7 @@ def rows(problem: Problem, order: np.ndarray) -> Problem:
         nox_kg=table.nox_kg[order],
         battery_power_w=table.battery_power_w[order],
         reject=table.reject[order],
+        **switching_rows(table, order),
         signals=Signals(*(getattr(table.signals, name)[order] for name in fields)),
         flows={},
         missing_torque_nm=None,

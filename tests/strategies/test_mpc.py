@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from problems import random_problem
+from problems import random_problem, switching_rows
 
 from hevopt import DataError, Problem, SolverError, simulate
 from hevopt.bounds.certificate import certify
@@ -28,8 +28,8 @@ def rows(problem: Problem, keep: slice, change=lambda table: {}) -> Problem:
     signals = type(table.signals)(*(getattr(table.signals, f)[keep] for f in SIGNALS))
     cut = ControlTable(
         table.time_s[keep], table.step_s[keep], table.fuel_kg[keep], table.nox_kg[keep],
-        table.battery_power_w[keep], table.reject[keep], table.mode, table.switch_fuel_kg,
-        table.switch_allowed, table.controls, signals,
+        table.battery_power_w[keep], table.reject[keep], table.mode, controls=table.controls,
+        signals=signals, **switching_rows(table, keep),
     )  # fmt: skip
     return replace(problem, table=replace(cut, **change(cut)))
 
