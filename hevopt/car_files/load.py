@@ -94,8 +94,10 @@ def _driveline(
         return WITHOUT_GEARBOX[kind](kind, options)
     assert gearbox is not None
     if kind == "even_shaft" and len(gearbox.ratios) < 3:
+        named = data.gearbox
+        file = named.get("file", named) if isinstance(named, Mapping) else named
         raise DataError(
-            f"{path}, gearbox: {shown(data.gearbox)} has 1 gear; coupling kind 'even_shaft' needs 2 "
+            f"{path}, gearbox: {shown(file)} has 1 gear; coupling kind 'even_shaft' needs 2 "
             "or more; choose another gearbox or kind"
         )
     return TEMPLATES[kind](kind, options, gearbox, machines["machine"])

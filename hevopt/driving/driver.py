@@ -20,6 +20,8 @@ _ALTERNATOR_EFFICIENCY_MIN = 0.5
 _GAP_SHARE_MAX = 0.8
 # What the engine must give beside, for the electric load.
 _NEED_MARGIN = 1.1
+# So that a need beside an engine without torque is without measure, not without value.
+_LEAST_NM = 1e-9
 
 
 def change_down(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbox) -> Demand:
@@ -58,7 +60,7 @@ def gap_shares(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbo
     """(time,) share of the step without torque through the gearbox: at a change of gear while driving.
 
     What is not driven meanwhile is made up for in the rest of the step. A driver from whom that asks more than the
-    engine's full load changes faster.
+    engine's full load, or than its map covers, changes faster.
     """
     before = np.concatenate([demand.gear[:1], demand.gear[:-1]])
     still = demand.wheel_speed_radps == 0
@@ -66,7 +68,8 @@ def gap_shares(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbo
     changed[1:] &= ~still[:-1]
     speed, need = _engine_speed_and_need(demand, demand.gear, engine, gearbox)
     need = np.maximum(need, 0.0) + vehicle.auxiliary_power_w / _ALTERNATOR_EFFICIENCY_MIN / speed
-    spare = 1 - _NEED_MARGIN * need / engine.full_load_nm(speed)
+    most = np.nan_to_num(engine.covered_nm(speed))
+    spare = 1 - _NEED_MARGIN * need / np.maximum(most, _LEAST_NM)
     share = np.minimum(gearbox.shift_gap_s / demand.step_s, _GAP_SHARE_MAX)
     return np.where(changed, np.clip(share, 0.0, np.maximum(spare, 0.0)), 0.0)
 

@@ -312,6 +312,8 @@ def test_wrong_fuel_map(hevopt, speeds, fuel, said):
 
 def test_an_engine_without_fuel_has_no_percentages(hevopt):
     fuel_map("[800, 5000]", "[[0, 0], [0, 0]]")
+    engine = Path("x_engine.toml")
+    engine.write_text(engine.read_text().replace("start_fuel_g = 0.2", "start_fuel_g = 0.0"))
     Path("c.csv").write_text(CYCLE)
     seen = hevopt("compare", "--architectures", "x.toml", "--cycle", "c.csv", "--json")
     rows = json.loads(seen.out, parse_constant=pytest.fail)["rows"]
@@ -324,7 +326,7 @@ def test_an_engine_without_fuel_has_no_percentages(hevopt):
 
 def test_a_figure_that_is_not_finite_is_a_failed_case(hevopt, monkeypatch):
     Path("c.csv").write_text(CYCLE)
-    monkeypatch.setattr("hevopt.studies.rows.litres_per_100km", lambda *_: float("inf"))
+    monkeypatch.setattr("hevopt.studies.case.litres_per_100km", lambda *_: float("inf"))
     seen = hevopt(
         "compare", "--architectures", "B", "--strategies", "dp", "--cycle", "c.csv", "--json"
     )

@@ -48,7 +48,7 @@ def test_a_drive_cut_at_its_gap_burns_what_it_burns_without_the_hours_parked(tmp
     (tmp_path / "cut.csv").write_text(result.text)
     cycle = load_cycle(tmp_path / "cut.csv")
     assert cycle.duration_s == 658 and cycle.distance_m == pytest.approx(8333.33, abs=0.01)
-    assert round(fuel_l_per_100km(cycle), 2) == 2.98
+    assert round(fuel_l_per_100km(cycle), 2) == 2.99
     assert "gaps cut out, their time and distance left out: line 332" in result.text
     assert not result.hints
 

@@ -58,7 +58,9 @@ def test_nedc_fuel_of_a_measured_engine_is_that_of_its_coefficients(hevopt):
         ours = car_with("engine", "bench.toml", name)
         rows = compare("nedc", [name, ours], [strategy]).rows
         assert rows[1].fuel_l_per_100km == pytest.approx(rows[0].fuel_l_per_100km, rel=5e-3)
-        assert rows[1].nox_mg_per_km == pytest.approx(rows[0].nox_mg_per_km, rel=3e-2)
+        # Of plans that burn alike NOx differs, as the objective does not count it.
+        loose = 3e-2 if strategy == "baseline" else 6e-2
+        assert rows[1].nox_mg_per_km == pytest.approx(rows[0].nox_mg_per_km, rel=loose)
 
 
 UNITS = {
@@ -574,4 +576,4 @@ def test_a_shortfall_is_driven_with_what_a_masked_map_covers(hevopt):
     assert "reaches up to the curve" not in seen.out
     for name in ("A", "C2"):
         table = compare("us06", [car_with("engine", "g.toml", name)], ["dp"], allow_shortfall=True)
-        assert table.rows[0].fuel_l_per_100km is not None, table.rows[0]
+        assert table.rows[0].fuel_l_per_100km is not None, table.failures
