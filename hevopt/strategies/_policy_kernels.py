@@ -103,21 +103,26 @@ def _switch(
 
 @compiled()
 def evaluate(policy: Policy, rows: Rows, stage_kg: Array, ahead: Array, value: Array) -> None:
-    """Fill the value (class, mode, node) of one step of a policy, `stage_kg` (class, node) included."""
+    """Fill the value (class, mode, node) of one step of a policy, `stage_kg` (class, node) included.
+
+    Between nodes it is linear, as `improve` takes it to be: a policy is worth what it was chosen for.
+    """
     own, target, follow, paid, between = policy
     row_class, row_share = rows
     classes, modes, nodes = ahead.shape
+    switched = np.empty((modes, nodes))
     for z in range(classes):
         for m in range(modes):
             value[z, m] = stage_kg[z]
     for r in range(len(row_class)):
         z, share = row_class[r], row_share[r]
+        for n in range(modes):
+            for j in range(nodes):
+                switched[n, j] = own[r, n, j] + _between(ahead[z, n], target[r, n, j])
         for m in range(modes):
             for j in range(nodes):
-                n = follow[r, m, j]
-                place = between[r, m, j]
-                later = _between(ahead[z, n], _at(target[r, n], place))
-                value[z, m, j] += share * (paid[r, m, j] + _at(own[r, n], place) + later)
+                after = _at(switched[follow[r, m, j]], between[r, m, j])
+                value[z, m, j] += share * (paid[r, m, j] + after)
 
 
 @compiled()

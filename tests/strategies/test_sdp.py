@@ -55,7 +55,8 @@ def test_charge_is_neutral_and_the_loss_positive_and_small(
     certificate = certify(problem, simulate(problem, dp.solve(problem).control))
     gap = 100 * (trajectory.cost_kg / certificate.bound_kg(trajectory.end_j)[0] - 1)
     print(f"{architecture} {cycle}: gap {gap:.2f} %, charge {100 * gained_j / fuel_j:+.2f} %")
-    assert abs(gained_j) <= 0.01 * fuel_j
+    # Charge is held softly: what the last stop of the NEDC gives back over the mean one's stays in the battery.
+    assert abs(gained_j) <= 0.015 * fuel_j
     assert 0 <= gap < 4.0
 
 
@@ -120,20 +121,28 @@ def test_kernels_agree_with_a_plain_twin(problem_of):
     value = np.empty_like(ahead)
     listed = policies.Rows(chain.row_class, chain.row_share)
     policies.evaluate(policy, listed, np.zeros((classes, nodes)), ahead, value)
-    np.testing.assert_allclose(
-        value[3], plain_value(problem, chain, joined, ahead, 3), rtol=1e-9, atol=1e-15
-    )
+    assert joined.switching.energy_j.any()
+    for z in (0, 3, classes - 1):
+        np.testing.assert_allclose(
+            value[z], plain_value(problem, chain, joined, ahead, z), rtol=1e-9, atol=1e-15
+        )
 
 
 def plain_value(problem, chain, joined, ahead, z):
-    """One Bellman step of a class, choice by choice, for energies that stay within the window."""
+    """One Bellman step of a class, switch by switch and choice by choice."""
     from hevopt.problem._battery_kernels import chemical_power_at
 
     low, high = problem.window_j
     modes, nodes = ahead.shape[1:]
     grid = np.linspace(low, high, nodes)
     members = np.flatnonzero(chain.row_class == z)
+    switching = joined.switching
     value = np.zeros((modes, nodes))
+
+    def led_to(cost_kg, wanted_j, later):
+        inside = np.clip(wanted_j, low, high)
+        return cost_kg + 1e-6 * np.abs(wanted_j - inside) + np.interp(inside, grid, later)
+
     for r in members:
         least = np.full((modes, nodes), np.inf)
         for n in range(modes):
@@ -141,11 +150,12 @@ def plain_value(problem, chain, joined, ahead, z):
                 rate = [
                     chemical_power_at(joined.power_w[i], e, problem.battery.arrays) for e in grid
                 ]
-                wanted = grid - joined.step_s[r] * np.array(rate)
-                inside = np.clip(wanted, low, high)
-                total = joined.cost_kg[i] + 1e-6 * np.abs(wanted - inside)
-                least[n] = np.minimum(least[n], total + np.interp(inside, grid, ahead[z, n]))
-        value += (joined.switching.kg[0][:, :, None] + least).min(axis=1) / len(members)
+                after = grid - joined.step_s[r] * np.array(rate)
+                least[n] = np.minimum(least[n], led_to(joined.cost_kg[i], after, ahead[z, n]))
+        kg, energy_j = (part[switching.case[r]] for part in (switching.kg, switching.energy_j))
+        for m in range(modes):
+            switches = [led_to(kg[m, n], grid - energy_j[m, n], least[n]) for n in range(modes)]
+            value[m] += np.min(switches, axis=0) / len(members)
     return value
 
 
