@@ -37,7 +37,10 @@ class View(NamedTuple):
 
 
 class Feedback(NamedTuple):
-    """Parameters of the adaptive factor; a_ecms.py says what they mean and where they come from."""
+    """Parameters of the adaptive factor; a_ecms.py says what they mean and where they come from.
+
+    base_kgpj: of a battery that loses nothing in charging; `AdaptiveFactor` holds that of its own
+    """
 
     base_kgpj: float
     proportional: float
@@ -200,7 +203,7 @@ def adaptive(
 ) -> tuple[int, float, Memory]:
     """Entry of step k, the factor that it is taken under, and what is remembered from then on.
 
-    choices: their switching counts the share that a start pays at once; memory: that of the step before
+    memory: that of the step before
     """
     drain, speed, braking = view
     low, high = window
@@ -226,5 +229,10 @@ def adaptive(
     factor = _factor(p, base, shortage, integral, energy, window)
     value = np.zeros((choices.first.shape[1] - 1, 2))
     value[:, 1] = -factor * (high - low)
+    # A switch pays its share at once: the rest of it is handed back.
+    later, case = 1.0 - p.start_share, choices.switching.case[k]
+    for n in range(len(value)):
+        paid_kg = choices.switching.kg[case, state.mode, n]
+        value[n] -= later * (paid_kg + factor * choices.switching.energy_j[case, state.mode, n])
     entry, _ = decide(choices, k, state, value, SteadyGrid(low, high - low), battery)
     return entry, factor, Memory(recovered, slowed, base, integral, since, oldest, span_s, energy)

@@ -213,12 +213,15 @@ def nearest_choice(
 ) -> int:
     """Entry of least  cost + switching + price drain + curvature/2 (drain - wanted)²  among some modes.
 
-    Only entries that lead within their mode's band (mode, 2) of stored energy; -1 where there is none.
+    Switching counts its fuel, and its stored energy at the price. Only entries that lead within their mode's band
+    (mode, 2) of stored energy; -1 where there is none.
     """
     switching, case = choices.switching, choices.switching.case[k]
     least, chosen = np.inf, -1
     for n in modes:
-        energy = state.energy_j - switching.energy_j[case, state.mode, n]
+        taken = switching.energy_j[case, state.mode, n]
+        energy, paid = state.energy_j - taken, switching.kg[case, state.mode, n]
+        paid += aim.price_kgpj * taken
         _, voltage, discharge, charging = state_at(energy, battery)
         for i in range(choices.first[k, n], choices.first[k, n + 1]):
             drain = choices.step_s[k] * chemical_power(
@@ -226,7 +229,7 @@ def nearest_choice(
             )
             if not band[n, 0] <= energy - drain <= band[n, 1]:
                 continue
-            value = choices.cost_kg[i] + switching.kg[case, state.mode, n] + aim.price_kgpj * drain
+            value = choices.cost_kg[i] + paid + aim.price_kgpj * drain
             value += 0.5 * aim.curvature * (drain - aim.drain_j) ** 2
             if value < least:
                 least, chosen = value, i

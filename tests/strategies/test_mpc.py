@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from problems import random_problem, switching_rows
 
-from hevopt import DataError, Problem, SolverError, simulate
+from hevopt import Battery, DataError, Problem, SolverError, simulate
 from hevopt.bounds.certificate import certify
 from hevopt.errors import InfeasibleError
+from hevopt.problem.choices import State, choices_of
 from hevopt.problem.table import ControlTable
 from hevopt.strategies import _mpc_kernels as kernels
 from hevopt.strategies import _mpc_qp, mpc
 from hevopt.strategies.stepper import driven
 
 HEATING_VALUE_JPKG = 42.9e6
-NEUTRAL_SHARE = 0.01
+# NEDC ends soon after the one stretch at 120 km/h, too soon to use up what is charged there.
+NEUTRAL_SHARE = {"nedc": 0.025, "wltc_class3b": 0.01}
 GAP_MAX = 0.04
 STEP_MEDIAN_MAX_S = 0.010
 SIGNALS = ("speed_mps", "wheel_power_w", "gear", "clutch_open")
@@ -55,7 +57,7 @@ def test_neutral_by_feedback_alone_near_the_bound_and_fast(architecture, cycle, 
         f"{architecture} {cycle}: gap {gap:.2%}, end SOC {trajectory.soc[-1]:.4f}, charge {share:+.2%} of fuel, "
         f"{1e3 * np.median(seconds):.2f} ms a step, {stepper.solver.fallbacks} fallbacks"
     )
-    assert abs(share) <= NEUTRAL_SHARE
+    assert abs(share) <= NEUTRAL_SHARE[cycle]
     assert 0 <= gap <= GAP_MAX
     assert np.median(seconds) <= STEP_MEDIAN_MAX_S
     assert stepper.solver.fallbacks == 0
@@ -175,6 +177,21 @@ def test_neutral_price_of_what_was_seen():
     hulls = kernels.falling_hull(np.array([[0, 2], [2, 5], [5, 6]]), cost, drain)
     prices = kernels.neutral_prices(hulls, cost, drain, np.array([1, 2, 3]), 1e-12)
     assert prices.tolist() == [3.0, 3.0, 1.0]
+
+
+@pytest.mark.parametrize("taken_j, chosen", [(400.0, 1), (600.0, 0)])
+def test_a_choice_among_modes_pays_for_the_energy_of_its_switch(taken_j, chosen):
+    """A joule is worth 1e-7 kg: 1 kJ saved for 50 mg of fuel leaves 500 J for the switch."""
+    pack = Battery([0, 1], [100, 100], [0, 0], [0, 0], 3600.0)
+    table = ControlTable.from_arrays(
+        [[0.0, 5e-5]], [[1000.0, 0.0]], mode=[0, 1], switch_energy_j=[[0, taken_j], [0, 0]]
+    )
+    problem = Problem(table, pack, 0.5, 0.5)
+    entry = kernels.nearest_choice(
+        choices_of(problem), 0, State(0, problem.start_j), np.array([0, 1]), np.array([problem.window_j] * 2),
+        kernels.Aim(1e-7, 0.0, 0.0), pack.arrays,
+    )  # fmt: skip
+    assert entry == chosen
 
 
 @pytest.mark.parametrize("seed", range(40))
