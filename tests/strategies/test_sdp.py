@@ -55,7 +55,7 @@ def test_charge_is_neutral_and_the_loss_positive_and_small(
     certificate = certify(problem, simulate(problem, dp.solve(problem).control))
     gap = 100 * (trajectory.cost_kg / certificate.bound_kg(trajectory.end_j)[0] - 1)
     print(f"{architecture} {cycle}: gap {gap:.2f} %, charge {100 * gained_j / fuel_j:+.2f} %")
-    # Charge is held softly: what the last stop of the NEDC gives back over the mean one's stays in the battery.
+    # Charge is held softly: D does not follow its reference down in the fast minute before the NEDC's last stop.
     assert abs(gained_j) <= 0.015 * fuel_j
     assert 0 <= gap < 4.0
 
