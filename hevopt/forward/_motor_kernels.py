@@ -64,9 +64,9 @@ def joined(
         return Joined(phase, 0.0, False, before.cause, limits.idle_radps)
     launch = launch_radps(need_nm, limits) if need_nm > 0.0 else limits.idle_radps
     launch = max(launch, before.launch_radps) if before.launches else launch
-    if not braking and input_radps < launch and (before.closing < 1.0 or before.launches):
-        return Joined(phase, 0.0, True, LAUNCH, launch)
-    if not braking and input_radps < limits.idle_radps:
+    # It begins where the gears are slower than idle speed; above that the clutch closes, however much is asked for.
+    begins_below = launch if before.launches else limits.idle_radps
+    if not braking and input_radps < begins_below:
         return Joined(phase, 0.0, True, LAUNCH, launch)
     if before.launches:
         return Joined(phase, 1.0, False, LAUNCH, limits.idle_radps)

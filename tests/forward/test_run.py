@@ -125,6 +125,14 @@ def test_a_cycle_that_asks_for_more_than_the_car_has_is_driven_on_and_marked():
     assert max(found.run.residual.values()) < 1e-9
 
 
+def test_a_clutch_does_not_slip_for_torque_once_the_gears_are_faster_than_idle_speed():
+    run = drive(load_architecture("A"), ramp(50.0, 20.0, 30), "baseline", step_s=0.05).run
+    launching = np.abs(run.books.flows["clutch_launch_w"]) > 0
+    assert launching.any() and run.gear.max() > 3
+    # Every gear after the first begins above idle speed: full load at that speed, not a launch for more of it.
+    assert run.gear[launching].max() == 1
+
+
 def test_gains_that_make_the_speed_swing_are_refused_with_the_factor():
     tyre = Tyre()
     assert (
