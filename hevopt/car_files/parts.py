@@ -49,6 +49,13 @@ def _check_joined(parts: tuple[Part, ...], placed: Mapping[str, str]) -> None:
             )
     if WHEEL not in {shaft for part in parts for shaft in part.shafts}:
         raise DataError(f"driveline: no part ends at {WHEEL!r}, the wheels; add a final drive")
+    reached = joined(parts, WHEEL).union(*(joined(parts, shaft) for shaft in placed.values()))
+    for part in parts:
+        if not reached.intersection(part.shafts):
+            raise DataError(
+                f"driveline: {part.name} turns nothing, as no part joins it to the wheels, "
+                f"{', '.join(placed)}; take it out, or correct a shaft's name"
+            )
 
 
 def _phases(line: Driveline) -> list[Phase]:

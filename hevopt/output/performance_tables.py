@@ -21,7 +21,7 @@ def speed_table(found: Sequence[Performance]) -> Table:
         table.add_column(f"{distance:g} m\ns", justify="right")
         table.add_column("at\nkm/h", justify="right")
     table.add_column("battery\nkJ to 100", justify="right")
-    table.add_column("until\nempty", justify="right")
+    table.add_column("repeats\nto empty", justify="right")
     for of in found:
         cells = [_number(of.to_speed_s[kmh], 2) for kmh in SPEEDS_KMH]
         for distance in DISTANCES_M:

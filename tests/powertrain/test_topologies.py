@@ -198,8 +198,10 @@ def test_a_shipped_hybrid_is_solved_and_proven(name):
         ('{ kind = "gear", name = "g", first = "ring", second = "wheel" }', "needs ratio"),
         ('{ kind = "planetary", name = "p", first = "a", sun = "s", ring = "r", carrier = "c", ratio = 2.0 }',
          "does not use first"),
+        (BRAKED_SPLIT.split("parts = [")[1].split("]")[0] + '{ kind = "gear", name = "idler", first = "a", '
+         'second = "b", ratio = 3.0 }', "idler turns nothing"),
     ],
-    ids=["a shaft that nothing turns", "a gear without ratio", "a key of another part"],
+    ids=["a shaft that nothing turns", "a gear without ratio", "a key of another part", "a part apart"],
 )  # fmt: skip
 def test_a_wrong_topology_names_its_parts(tmp_path, parts, words):
     from hevopt import DataError
