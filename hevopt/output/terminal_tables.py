@@ -68,7 +68,7 @@ _COLUMNS = (
     _Column("s", _number("solve_s", ".2f"), 11),
 )
 # Only where another end charge than the start's is asked; before the corrected fuel.
-_BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", ".2f"), 0)
+_BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", "z.2f"), 0)
 _BATTERY_PLACE = 7
 
 

@@ -76,3 +76,9 @@ def test_a_failed_row_is_one_word_where_it_is_narrow(seen):
     rows = [line for line in table_of(seen(80)) if line.startswith(" A ")]
     assert len(rows) == 3 and all(line.endswith("failed") for line in rows)
     assert "cannot follow" in " ".join(table_of(seen(None)))
+
+
+def test_a_battery_that_ends_as_it_began_gives_no_negative_nought(monkeypatch, capsys):
+    cars = ("--architectures", "C2,p2_plug_in", "--strategies", "dp")
+    out = call(monkeypatch, capsys, "compare", *cars, "--wide").out
+    assert "kWh/100km" in out and re.search(r" 0\.00 ", out) and "-0.00 " not in out
