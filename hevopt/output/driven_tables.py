@@ -123,7 +123,7 @@ def trace_text(run: ForwardRun) -> str:
         f"trace: left ±2 km/h and ±1 s {len(left)} time{'s' if len(left) > 1 else ''}, "
         f"{run.quality.outside_s:.1f} s; "
         f"longest {longest.duration_s:.1f} s from t = {longest.start_s:.1f} s, by up to "
-        f"{longest.beyond_mps * KMH_PER_MPS:.1f} km/h more"
+        f"{longest.beyond_mps * KMH_PER_MPS:.1f} km/h outside"
     )
 
 

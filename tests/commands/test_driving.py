@@ -35,6 +35,7 @@ def test_a_missed_trace_is_told_and_status_3_where_asked(hevopt):
     words = ("drive", "A", "--strategy", "baseline", "--cycle", "us06", "--step", "0.05")
     seen = hevopt(*words)
     assert seen.status == 0 and "trace missed" in seen.out and "trace: left ±2 km/h" in seen.out
+    assert "km/h outside" in seen.out
     assert hevopt(*words, "--strict").status == 3
 
 
