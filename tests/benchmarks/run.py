@@ -35,6 +35,7 @@ from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.driving.demand import demand_of
 from hevopt.powertrain.powertrain import build_table
 from hevopt.problem.choices import choices_of, without_dominated
+from hevopt.problem.switching import at_step
 from hevopt.strategies import _backward_kernels as kernels
 from hevopt.strategies import dp, ecms
 from hevopt.strategies._rollout_kernels import Grid
@@ -79,7 +80,7 @@ def numpy_backward(problem: Problem, nodes: int, steps: int) -> int:
     grid = np.linspace(low, high, nodes)
     slope = np.ptp(pack.open_circuit_v) / np.ptp(pack.soc)
     voltage = np.sqrt(pack.open_circuit_v[0] ** 2 + 2 * slope * grid / pack.capacity_as)
-    value = np.tile(1e-7 * np.maximum(problem.end_min_j - grid, 0), (len(table.switch_fuel_kg), 1))
+    value = np.tile(1e-7 * np.maximum(problem.end_min_j - grid, 0), (table.modes, 1))
     count = 0
     for k in range(len(table.step_s) - 1, len(table.step_s) - 1 - steps, -1):
         usable = np.flatnonzero(table.feasible[k])
@@ -101,7 +102,12 @@ def numpy_backward(problem: Problem, nodes: int, steps: int) -> int:
             mine = table.mode[usable] == m
             if mine.any():
                 least[m] = total[mine].min(axis=0)
-        value = np.min(table.switch_fuel_kg[:, :, None] + least[None], axis=1)
+        kg, energy_j = at_step(table.switch_fuel_kg, k), at_step(table.switch_energy_j, k)
+        switched = [
+            [np.interp(grid - energy_j[m, n], grid, least[n]) for n in range(table.modes)]
+            for m in range(table.modes)
+        ]
+        value = np.min(kg[:, :, None] + np.array(switched), axis=1)
         count += len(usable) * nodes
     return count
 
