@@ -159,7 +159,7 @@ def problem_lines(problems: dict[str, Problem]) -> list[str]:
         worth = one_price_dual(problem)[-1].price_kgpj
         figures = [
             median_s(lambda car=car, demand=demand: build_table(car, demand)),
-            median_s(lambda p=problem: one_price_dual(p)),
+            median_s(lambda p=problem: one_price_dual.__wrapped__(p)),
             median_s(lambda p=problem, r=rollout: costate_dual(p, r)),
             median_s(lambda p=problem, r=rollout: lp_dual(p, r), 3),
             median_s(lambda p=problem, w=worth: lower_bound_kg(p, w, nodes=16_001), 3),
