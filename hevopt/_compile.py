@@ -26,7 +26,9 @@ from numba.core.runtime import rtsys
 
 _DIGEST_BYTES = hashlib.sha256().digest_size
 # Files of loops, and of the tuples and constants that they are compiled with.
-_COMPILED_WITH = ("_*kernels.py", "parameters.py", "states.py")
+_COMPILED_WITH = (
+    "_*kernels.py", "parameters.py", "states.py", "handling.py", "choices.py", "switching.py", "units.py",
+)  # fmt: skip
 _Loop = TypeVar("_Loop", bound=Callable[..., Any])
 
 

@@ -5,12 +5,14 @@ import re
 import subprocess
 import sys
 from collections import defaultdict
+from fnmatch import fnmatch
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 import hevopt
+from hevopt._compile import _COMPILED_WITH
 
 PACKAGE = Path(hevopt.__file__).parent
 ROOT = Path(__file__).parents[1]
@@ -119,6 +121,18 @@ def test_folders_within_a_room_import_one_way():
         if folder.count(".") > 1:
             graph.setdefault(folder, set()).update(inside)
     TopologicalSorter(graph).prepare()
+
+
+def test_what_loops_are_compiled_with_counts_where_one_is_taken_from_the_disk():
+    # The package's marker and names of types stand in no loop.
+    apart = {"hevopt._compile", "hevopt.problem.arrays"}
+    loops = [path for path in MODULES if fnmatch(path.name, "_*kernels.py")]
+    for path in loops:
+        for name in imports_of(path) - apart:
+            file = f"{name.rpartition('.')[2]}.py"
+            assert any(fnmatch(file, known) for known in _COMPILED_WITH), (
+                f"{name_of(path)} uses {name}"
+            )
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
