@@ -14,9 +14,9 @@ from hevopt.display.facts import Shown
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.lines import Line
-from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.battery import step_flows
 
 CAUSES = {motor.LAUNCH: "launch", motor.CHANGE: "change", motor.START: "start", motor.NONE: "other"}
 
@@ -84,7 +84,9 @@ def books_of(
     energy_j = trace(
         start[2], np.zeros(len(record)), electric, np.full(len(record), step_s), car.battery.arrays
     )
-    flows |= _battery(car, energy_j, electric, step_s)
+    flows["battery_power_w"] = electric
+    losses = step_flows(car.battery, energy_j[:-1], energy_j[1:], electric, step_s)
+    flows |= {name: losses[name] for name in ("battery_chemical_w", "battery_loss_w")}
     off_map = np.isnan(flows["fuel_power_w"]) | np.isnan(flows["machine_loss_w"])
     return Books(flows, _residuals(flows), energy_j, off_map)
 
@@ -171,20 +173,6 @@ def _burnt(car: Architecture, flows: Mapping[str, Array]) -> dict[str, Array]:
         "engine_loss_w": power - torque * speed,
         "machine_loss_w": loss,
         "machine_electric_w": flows["machine_power_w"] + loss,
-    }
-
-
-def _battery(car: Architecture, energy_j: Array, power_w: Array, step_s: float) -> dict[str, Array]:
-    """Losses from current and resistance, to hold against the change of stored energy."""
-    pack = car.battery
-    _, voltage, discharge, charge = battery_model.states(pack, energy_j[:-1])
-    resistance = np.where(power_w < 0, charge, discharge)
-    current = battery_model.source_power_w(power_w, voltage, resistance)[0] / voltage
-    coulombic = (1 - pack.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
-    return {
-        "battery_power_w": power_w,
-        "battery_chemical_w": (energy_j[:-1] - energy_j[1:]) / step_s,
-        "battery_loss_w": resistance * current**2 + coulombic,
     }
 
 

@@ -182,6 +182,26 @@ def chemical_power_w(
     return drain_w
 
 
+def step_flows(
+    battery: Battery, before_j: Array, after_j: Array, power_w: Array, step_s: float | Array
+) -> dict[str, Array]:
+    """Powers, voltage and current of steps, (time,): the loss from current and resistance before each step.
+
+    before_j, after_j: (time,) stored energy; the chemical power is what it falls by, so that the loss can be held
+    against it
+    """
+    _, voltage, discharge, charge = states(battery, before_j)
+    resistance = np.where(power_w < 0, charge, discharge)
+    current = source_power_w(power_w, voltage, resistance)[0] / voltage
+    coulombic = (1 - battery.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
+    return {
+        "battery_chemical_w": (before_j - after_j) / step_s,
+        "battery_loss_w": resistance * current**2 + coulombic,
+        "battery_voltage_v": voltage - resistance * current,
+        "battery_current_a": current,
+    }
+
+
 def best_voltage_and_resistance(battery: Battery, charging: bool) -> tuple[float, float]:
     """Highest voltage and lowest resistance within the SOC window: no state of charge loses less."""
     inside = battery.within_window()

@@ -46,7 +46,10 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     fuel_kg = table.fuel_kg[steps, control] + switch.kg
     nox_kg = table.nox_kg[steps, control]
     flows = cast(Flows, table.flows).along(control)
-    flows |= _battery_flows(problem, energy_j, switch.energy_j, power_w)
+    between_j = energy_j[:-1] - switch.energy_j
+    flows |= battery_model.step_flows(
+        problem.battery, between_j, energy_j[1:], power_w, table.step_s
+    )
     return Trajectory(
         problem=problem,
         control=control,
@@ -129,23 +132,6 @@ def _check_window(problem: Problem, energy_j: Array, switch_j: Array) -> None:
         f"{found} {where} step {k} (t = {problem.table.time_s[k]:g} s); allowed: "
         f"{problem.battery.soc_min:g} to {problem.battery.soc_max:g}"
     )
-
-
-def _battery_flows(
-    problem: Problem, energy_j: Array, switch_j: Array, power_w: Array
-) -> dict[str, Array]:
-    """Losses from current and resistance, to hold against the change of stored energy in the step itself."""
-    pack, between_j = problem.battery, energy_j[:-1] - switch_j
-    _, voltage, discharge, charge = battery_model.states(pack, between_j)
-    resistance = np.where(power_w < 0, charge, discharge)
-    current = battery_model.source_power_w(power_w, voltage, resistance)[0] / voltage
-    coulombic = (1 - pack.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
-    return {
-        "battery_chemical_w": (between_j - energy_j[1:]) / problem.table.step_s,
-        "battery_loss_w": resistance * current**2 + coulombic,
-        "battery_voltage_v": voltage - resistance * current,
-        "battery_current_a": current,
-    }
 
 
 def _residuals(
