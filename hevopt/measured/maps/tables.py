@@ -19,7 +19,7 @@ from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import (
     Column,
     Measured,
-    column_named,
+    asked_column,
     column_of,
     columns_found,
     read_measured,
@@ -101,12 +101,9 @@ def _read(source: Source, layout: Callable, *terms: Any) -> tuple[Measured, bool
 
 
 def _column(measured: Measured, source: Source, role: str) -> Column | None:
-    if role in source.columns:
-        return column_named(measured, source.columns[role])
-    option = f"--column {role}=NAME"
-    column = column_of(measured, ALIASES[role], option)
+    column = asked_column(measured, role, source.columns, ALIASES[role])
     if column is None and role in POWERS:
-        return column_of(measured, POWERS[role], option)
+        return column_of(measured, POWERS[role], f"--column {role}=NAME")
     return column
 
 

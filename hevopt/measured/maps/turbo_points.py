@@ -16,10 +16,8 @@ from hevopt.errors import DataError
 from hevopt.measured.maps.lines import clusters
 from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import (
-    Column,
     Measured,
-    column_named,
-    column_of,
+    asked_column,
     columns_found,
     read_measured,
 )
@@ -96,7 +94,7 @@ def turbo_points(
     measured = read_measured(path, sheet=sheet)
     values, kinds, notes = {}, {}, list(measured.notes)
     for role in ALIASES:
-        column = _column(measured, role, columns)
+        column = asked_column(measured, role, columns, ALIASES[role])
         if column is None or (role == "vanes" and kind == "compressor"):
             _refuse_missing(measured, role, kind, columns, units)
             continue
@@ -114,12 +112,6 @@ def turbo_points(
     return TurboPoints(
         speed, flow, values["ratio"], values["efficiency"], vanes, line, line_speed, measured.lines, tuple(notes)
     )  # fmt: skip
-
-
-def _column(measured: Measured, role: str, columns: Mapping[str, str]) -> Column | None:
-    if role in columns:
-        return column_named(measured, columns[role])
-    return column_of(measured, ALIASES[role], f"--column {role}=NAME")
 
 
 def _refuse_missing(

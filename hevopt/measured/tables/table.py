@@ -232,6 +232,15 @@ def column_of(measured: Measured, aliases: Collection[str], option: str) -> Colu
     return found[0] if found else None
 
 
+def asked_column(
+    measured: Measured, role: str, columns: Mapping[str, str], aliases: Collection[str]
+) -> Column | None:
+    """The column that --column names for a role, else the one whose name is an alias; None where there is none."""
+    if role in columns:
+        return column_named(measured, columns[role])
+    return column_of(measured, aliases, f"--column {role}=NAME")
+
+
 def first_column_of(
     measured: Measured, tiers: Sequence[Collection[str]], option: str
 ) -> Column | None:
