@@ -11,7 +11,6 @@ moves are bounded there in another way.
 """
 
 import hashlib
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from hevopt.bounds.certificate import Certificate, Proof, Scope
 from hevopt.bounds.lower_dp import slope_kgpj
 from hevopt.bounds.prices import EPSILON
+from hevopt.problem.once import once
 from hevopt.problem.problem import Problem, Trajectory
 
 FORMAT = 1
@@ -52,10 +52,11 @@ def table_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
     return {name: np.asarray(arrays[name], order="C") for name in sorted(arrays)}
 
 
-def digest_of(arrays: Mapping[str, NDArray[Any]]) -> str:
-    """SHA-256 of arrays by name."""
+@once
+def digest_of(problem: Problem) -> str:
+    """SHA-256 of the arrays of a problem, by name."""
     digest = hashlib.sha256()
-    for name, array in arrays.items():
+    for name, array in table_arrays(problem).items():
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode() + array.tobytes())
     return digest.hexdigest()
 

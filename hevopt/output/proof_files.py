@@ -45,12 +45,11 @@ def write_proof(folder: Path, name: str, plan: Trajectory, certificate: Certific
     A table is named by the first digits of its digest, so that the strategies of a car share one; signs that files
     should not have in their names become "_". Raises DataError where a file cannot be written.
     """
-    arrays = table_arrays(plan.problem)
-    digest = digest_of(arrays)
+    digest = digest_of(plan.problem)
     table = folder / f"{digest[:16]}.table.npz"
     if not table.exists():
         held = BytesIO()
-        np.savez_compressed(held, **arrays)  # type: ignore[arg-type]
+        np.savez_compressed(held, **table_arrays(plan.problem))  # type: ignore[arg-type]
         write_whole(table, held.getvalue())
     told = {"table": table.name, "table_sha256": digest, **proof_of(plan, certificate)}
     path = folder / f"{_UNSAFE.sub('_', name)}.proof.json"
