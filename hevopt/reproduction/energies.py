@@ -9,7 +9,7 @@ from hevopt.bounds.certificate import certify
 from hevopt.problem.simulation import simulate
 from hevopt.reproduction.variations import Varied, signals_of
 from hevopt.strategies import strategy_named
-from hevopt.units import litres_per_100km
+from hevopt.studies.case import litres
 
 
 class Balance(NamedTuple):
@@ -63,5 +63,5 @@ def balance(shipped: Varied, rule: str) -> Balance:
         start_fuel=burnt(trajectory.total_fuel_kg) - running,
         end_charge=burnt(worth_kg),
         engine_efficiency_percent=100 * work / running,
-        fuel_l_per_100km=litres_per_100km(fuel_kg, car.engine.fuel_density_kgpm3, cycle.distance_m),
+        fuel_l_per_100km=litres(car, cycle, fuel_kg),
     )

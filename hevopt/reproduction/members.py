@@ -9,8 +9,8 @@ from hevopt.problem.problem import Plan
 from hevopt.reproduction.published import Figures, percent
 from hevopt.reproduction.variations import Varied
 from hevopt.strategies import conventional, strategy_named
+from hevopt.studies.case import litres
 from hevopt.studies.rows import NEUTRAL_PERCENT
-from hevopt.units import litres_per_100km
 
 CURVE_KW = tuple(range(15))
 
@@ -90,6 +90,6 @@ def surplus_percent(car: Architecture, surplus_j: float, fuel_kg: float) -> floa
 def in_units(car: Architecture, cycle: Cycle, fuel_kg: float, nox_kg: float) -> Figures:
     """Fuel and NOx of a cycle in the units of a report."""
     return Figures(
-        litres_per_100km(fuel_kg, car.engine.fuel_density_kgpm3, cycle.distance_m),
+        litres(car, cycle, fuel_kg),
         nox_kg * 1e6 / (cycle.distance_m / 1e3),
     )
