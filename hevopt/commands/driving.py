@@ -7,8 +7,7 @@ import typer
 
 from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOption, takes_settings
 from hevopt.commands.terminal import Progress, show, write
-
-_MISSED = 3
+from hevopt.errors import DataError, InfeasibleError
 
 
 @takes_settings("strategies", "allow_shortfall")
@@ -61,7 +60,7 @@ def drive(
         if out is not None:
             write(f"steps written to {out}")
     if strict and driven.run.missed:
-        raise typer.Exit(_MISSED)
+        raise typer.Exit(InfeasibleError.exit_status)
 
 
 def performance(
@@ -85,7 +84,6 @@ def performance(
     from hevopt.car.handling import Shifting
     from hevopt.car_files.load import load_architecture
     from hevopt.commands.terminal import listed
-    from hevopt.errors import DataError
     from hevopt.forward.performance import performance as figures_of
     from hevopt.forward.run import Handling
     from hevopt.output import performance_tables as tables
@@ -123,7 +121,6 @@ def performance(
 
 
 def _check_plot(plot: Path) -> None:
-    from hevopt.errors import DataError
     from hevopt.files.writing import check_writable
 
     check_writable(plot)

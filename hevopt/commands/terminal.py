@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 _PROGRESS_AFTER_S = 2.0
-_WIDEST = 400
 
 
 def listed(text: str | None) -> list[str] | None:
@@ -31,8 +30,9 @@ def show(table: "Table") -> None:
     """Print a table; a terminal narrower than its numbers wraps lines rather than losing digits."""
     from rich.console import Console
 
-    needed = Console(width=_WIDEST).measure(table).maximum
-    console = Console(highlight=False, width=max(Console().width, needed))
+    from hevopt.output.tables import needed_width
+
+    console = Console(highlight=False, width=max(Console().width, needed_width(table)))
     with console.capture() as capture:
         console.print(table)
     text = capture.get().removesuffix("\n")

@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.car.handling import check_ranges
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.forward import _pull_kernels as col
@@ -53,6 +53,11 @@ class Performance(Shown):
     repeats: float | None
     curves: "Curves"
     trace: Array
+
+    @property
+    def name(self) -> str:
+        """The car's name, and whether its machine helps."""
+        return f"{self.car.name}, e-boost" if self.boosts else self.car.name
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -106,7 +111,7 @@ def performance(
     start_j = float(energy_j(car.battery, car.soc_start))
     trace = _pulled(driven, by_gear, foot, (0.0, 0, start_j))
     curves = forces_of(car, line, driven, boosts)
-    engine = forces_of(car, line, driven, False)
+    engine = forces_of(car, line, driven, False) if boosts else curves
     to_100 = _first(trace[:, col.SPEED], 100 / KMH_PER_MPS)
     used = None if to_100 is None else start_j - _stored_j(trace, to_100)
     window = start_j - float(energy_j(car.battery, car.battery.soc_min))
@@ -135,9 +140,7 @@ def _check(
         raise DataError(
             f"added mass {added_kg:g} kg, boost lag {boost_lag_s:g} s; allowed: -200 to 5000 kg, 0 to 10 s"
         )
-    for part in (handling.tyre, handling.clutch, handling.shifting):
-        if part is not None:
-            check_ranges(part)
+    handling.check()
 
 
 def _by_gear(line: Line) -> Indices:
@@ -217,15 +220,13 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     for way in _by_gear(line):
         ratio = ways.wheel[way, -1]
         side = np.maximum(ratio * wheel, LAUNCH_RPM / RPM_PER_RADPS if way == 0 else 0.0)
-        full = np.interp(side, limits.engine_step * np.arange(len(limits.full_nm)), limits.full_nm)
+        full = _tabulated(limits.full_nm, limits.engine_step, side)
         machine_speed = ways.wheel[way, 1] * wheel + ways.side[way, 1] * side
         machine = np.zeros_like(speed)
         if len(limits.load_nm):
-            at = limits.engine_step * np.arange(len(limits.load_nm))
-            machine = np.interp(machine_speed, at, limits.load_nm)
+            machine = _tabulated(limits.load_nm, limits.engine_step, machine_speed)
         elif boosts:
-            at = limits.machine_step * np.arange(len(limits.high_nm))
-            machine = np.interp(machine_speed, at, limits.high_nm)
+            machine = _tabulated(limits.high_nm, limits.machine_step, machine_speed)
         on_side = full + ways.side[way, 1] * machine
         torque = ratio * ways.wheel_yield[way, 0, -1] * on_side
         torque += ways.wheel[way, 1] * ways.wheel_yield[way, 0, 1] * machine
@@ -236,6 +237,11 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     tyre = driven.body.tyre
     grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
     return Curves(speed, np.array(by_gear), resistance, float(grip))
+
+
+def _tabulated(values: Array, step: float, speed: float | Array) -> Array:
+    """A torque that is tabulated over even steps of speed, rad/s."""
+    return np.asarray(np.interp(speed, step * np.arange(len(values)), values))
 
 
 def _top(curves: Curves, gear: int) -> float:
@@ -252,14 +258,9 @@ def _top(curves: Curves, gear: int) -> float:
 
 def _slope(car: Architecture, curves: Curves, speed_mps: float, handling: Handling) -> float:
     """Highest slope, rise over run, held at a speed: by force in the best gear, and by grip."""
-    known = [
-        float(np.interp(speed_mps, curves.speed_mps, force))
-        for force in curves.by_gear_n
-        if np.isfinite(np.interp(speed_mps, curves.speed_mps, force))
-    ]
-    spare = max(known, default=0.0) - float(
-        np.interp(speed_mps, curves.speed_mps, curves.resistance_n)
-    )
+    at_speed = partial(np.interp, speed_mps, curves.speed_mps)
+    forces = [float(at_speed(force)) for force in curves.by_gear_n]
+    spare = max(filter(np.isfinite, forces), default=0.0) - float(at_speed(curves.resistance_n))
     return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
 
 
@@ -267,9 +268,7 @@ def _start_slope(car: Architecture, driven: LoopCar, handling: Handling) -> floa
     """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip."""
     limits, ways = driven.limits, driven.ways
     launch = LAUNCH_RPM / RPM_PER_RADPS
-    full = float(
-        np.interp(launch, limits.engine_step * np.arange(len(limits.full_nm)), limits.full_nm)
-    )
+    full = float(_tabulated(limits.full_nm, limits.engine_step, launch))
     passed = min(full, handling.clutch.slipping_nm)
     force = ways.wheel[0, -1] * ways.wheel_yield[0, 0, -1] * passed / driven.body.radius_m
     spare = force - driven.body.rolling_n[0]

@@ -38,6 +38,12 @@ class Handling(NamedTuple):
     shifting: Shifting | None = None
     driver: DriverGains = DriverGains()
 
+    def check(self) -> None:
+        """DataError for a figure of tyres, clutch or gear changes that is out of range."""
+        for part in (self.tyre, self.clutch, self.shifting):
+            if part is not None:
+                check_ranges(part)
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ForwardRun(Shown):
@@ -213,9 +219,7 @@ def _check(cycle: Cycle, step_s: float, handling: Handling) -> None:
             f"cycle {cycle.name}: {cycle.duration_s / step_s:.3g} steps of {step_s:g} s; allowed: {STEPS_MAX:g}; "
             "choose a longer step"
         )
-    for part in (handling.tyre, handling.clutch, handling.shifting):
-        if part is not None:
-            check_ranges(part)
+    handling.check()
     check_gains(handling.driver, handling.tyre, step_s)
 
 

@@ -3,13 +3,13 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from hevopt.files.shown import printable
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.run import ForwardRun
+from hevopt.output.tables import number, titled_table
 from hevopt.studies.driven import DrivenPlan
 from hevopt.units import KMH_PER_MPS
 
@@ -45,12 +45,12 @@ def twin_table(driven: DrivenPlan) -> Table:
                    "SOC\nend", "starts\n", "status\n")  # fmt: skip
     table.add_row(
         "forward", f"{driven.fuel_l_per_100km:.4f}", f"{driven.corrected_l_per_100km:.4f}",
-        _number(driven.nox_mg_per_km, 1), f"{run.soc[-1]:.4f}", f"{run.starts}",
+        number(driven.nox_mg_per_km, 1), f"{run.soc[-1]:.4f}", f"{run.starts}",
         Text(", ".join(driven.marks) or "ok"),
     )  # fmt: skip
     table.add_row(
-        "backward", _number(back.fuel_l_per_100km, 4), _number(back.fuel_corrected_l_per_100km, 4),
-        _number(back.nox_mg_per_km, 1), _number(back.soc_end, 4), f"{back.engine_starts}",
+        "backward", number(back.fuel_l_per_100km, 4), number(back.fuel_corrected_l_per_100km, 4),
+        number(back.nox_mg_per_km, 1), number(back.soc_end, 4), f"{back.engine_starts}",
         Text(str(back.status)),
     )  # fmt: skip
     table.add_row("bound", f"{driven.bound_l_per_100km:.4f}", "", "", f"{run.soc[-1]:.4f}", "", "")
@@ -60,8 +60,9 @@ def twin_table(driven: DrivenPlan) -> Table:
 def audit_table(driven: DrivenPlan) -> Table:
     """Where the energy came from and where it went."""
     table = _table("energy, kJ", "from\n", "\nkJ", "to\n", "\nkJ")
-    given = [(name, value) for name, value in audit(driven.run).items() if value > _TINY_J]
-    taken = [(name, -value) for name, value in audit(driven.run).items() if value < -_TINY_J]
+    found = audit(driven.run).items()
+    given = [(name, value) for name, value in found if value > _TINY_J]
+    taken = [(name, -value) for name, value in found if value < -_TINY_J]
     for n in range(max(len(given), len(taken))):
         cells: list[str] = []
         for side in (given, taken):
@@ -189,18 +190,11 @@ def steps_frame(run: ForwardRun) -> "pd.DataFrame":
 
 
 def _table(title: str, *heads: str) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD, title=Text(title, style="table.title"), title_justify="left",
-        collapse_padding=True, pad_edge=False,
-    )  # fmt: skip
+    table = titled_table(title)
     for n, head in enumerate(heads):
         words = n == 0 or head.startswith(("status", "to"))
         table.add_column(head, justify="left" if words else "right", no_wrap=words)
     return table
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _finite(value: float) -> float | None:

@@ -21,9 +21,8 @@ def force_diagram(found: Sequence[Performance], kind: str) -> bytes:
     weight = found[0].car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
     kmh = first.speed_mps * KMH_PER_MPS
     for n, of in enumerate(found):
-        name = f"{of.car.name}{', e-boost' if of.boosts else ''}"
         for gear, force in enumerate(of.curves.by_gear_n):
-            label = name if gear == 0 else None
+            label = of.name if gear == 0 else None
             axes.plot(
                 kmh, force / 1e3, color=_COLOURS[n % len(_COLOURS)], linewidth=1.2, label=label
             )

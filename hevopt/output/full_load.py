@@ -3,14 +3,13 @@
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from rich import box
 from rich.table import Table
-from rich.text import Text
 
 from hevopt.car.engine import Engine
 from hevopt.mean_value import states as s
 from hevopt.mean_value.full_load import FullLoad
 from hevopt.measured.plot import png
+from hevopt.output.tables import titled_table
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -46,10 +45,7 @@ def columns(found: FullLoad, engine: Engine) -> dict[str, Array]:
 
 def full_load_table(found: FullLoad, engine: Engine) -> Table:
     """The curve, a row per speed."""
-    table = Table(
-        box=box.SIMPLE_HEAD, title=Text(f"settled full load, {engine.name}", style="table.title"),
-        title_justify="left", collapse_padding=True, pad_edge=False,
-    )  # fmt: skip
+    table = titled_table(f"settled full load, {engine.name}")
     forms = (
         ".0f",
         ".1f",

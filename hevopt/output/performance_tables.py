@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from hevopt.forward.performance import DISTANCES_M, SPEEDS_KMH, SUSTAINED_KMH, Performance
+from hevopt.output.tables import number, titled_table
 from hevopt.units import KMH_PER_MPS
 
 # What is to be known beside every figure of the first seconds.
@@ -23,7 +23,7 @@ def speed_table(found: Sequence[Performance]) -> Table:
     table.add_column("battery\nkJ to 100", justify="right")
     table.add_column("repeats\nto empty", justify="right")
     for of in found:
-        cells = [_number(of.to_speed_s[kmh], 2) for kmh in SPEEDS_KMH]
+        cells = [number(of.to_speed_s[kmh], 2) for kmh in SPEEDS_KMH]
         for distance in DISTANCES_M:
             there = of.to_distance[distance]
             cells += (
@@ -33,8 +33,8 @@ def speed_table(found: Sequence[Performance]) -> Table:
             )
         used = of.to_100_j if of.boosts else None
         cells.append("-" if used is None else f"{used / 1e3:.0f}")
-        cells.append(_number(of.repeats, 1))
-        table.add_row(Text(_name(of)), *cells)
+        cells.append(number(of.repeats, 1))
+        table.add_row(Text(of.name), *cells)
     return table
 
 
@@ -43,7 +43,7 @@ def gear_table(found: Sequence[Performance]) -> Table:
     cases = list(dict.fromkeys(case for of in found for case in of.in_gear_s))
     table = _table("in gear, s", *(f"{gear}.\n{low}-{high}" for gear, low, high in cases))
     for of in found:
-        table.add_row(Text(_name(of)), *(_number(of.in_gear_s.get(case), 2) for case in cases))
+        table.add_row(Text(of.name), *(number(of.in_gear_s.get(case), 2) for case in cases))
     return table
 
 
@@ -54,9 +54,9 @@ def limit_table(found: Sequence[Performance]) -> Table:
     heads += ["start\n%", *(f"{kmh} km/h\n%" for kmh in SUSTAINED_KMH)]
     table = _table("top speed and slope", *heads)
     for of in found:
-        tops = [_number(_kmh(of.top_mps.get(gear)), 0) for gear in range(1, gears + 1)]
+        tops = [number(_kmh(of.top_mps.get(gear)), 0) for gear in range(1, gears + 1)]
         slopes = [of.start_slope, *(of.slope[kmh] for kmh in SUSTAINED_KMH)]
-        table.add_row(Text(_name(of)), *tops, *(f"{100 * slope:.1f}" for slope in slopes))
+        table.add_row(Text(of.name), *tops, *(f"{100 * slope:.1f}" for slope in slopes))
     return table
 
 
@@ -83,23 +83,12 @@ def as_dict(of: Performance) -> dict[str, Any]:
     }
 
 
-def _name(of: Performance) -> str:
-    return f"{of.car.name}, e-boost" if of.boosts else of.car.name
-
-
 def _kmh(speed_mps: float | None) -> float | None:
     return None if speed_mps is None else speed_mps * KMH_PER_MPS
 
 
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
-
-
 def _table(title: str, *heads: str) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD, title=Text(title, style="table.title"), title_justify="left",
-        collapse_padding=True, pad_edge=False,
-    )  # fmt: skip
+    table = titled_table(title)
     table.add_column("car", no_wrap=True)
     for head in heads:
         table.add_column(head, justify="right")

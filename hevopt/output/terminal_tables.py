@@ -4,18 +4,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from rich import box
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from hevopt.files.shown import printable
+from hevopt.output.tables import needed_width, titled_table
 from hevopt.problem.problem import Plan
 from hevopt.reproduction.published import published_beside
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row, end_asked_text, marked, no_reference_text
 
 _CAUSAL_MARK = "†"
-_WIDEST = 400
 
 
 class _Column(NamedTuple):
@@ -81,10 +80,10 @@ def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
     columns = list(_COLUMNS)
     if comparison.end_asked:
         columns.insert(_BATTERY_PLACE, _BATTERY)
-    if width is None or _width(_table(comparison, columns)) <= width:
+    if width is None or needed_width(_table(comparison, columns)) <= width:
         return _table(comparison, columns)
     leaving = sorted(columns, key=lambda column: column.leaves)
-    while leaving[-1].leaves and _width(_table(comparison, columns, brief=True)) > width:
+    while leaving[-1].leaves and needed_width(_table(comparison, columns, brief=True)) > width:
         columns.remove(leaving.pop())
     return _table(comparison, columns, brief=True)
 
@@ -101,19 +100,8 @@ def left_out(table: Table) -> list[str]:
     return names
 
 
-def _width(table: Table) -> int:
-    """What a table needs so that nothing in it goes on in the next line."""
-    return Console(width=_WIDEST).measure(table).maximum
-
-
 def _table(comparison: Comparison, columns: Sequence[_Column], *, brief: bool = False) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        title=Text(f"cycle {comparison.cycle}", style="table.title"),
-        title_justify="left",
-        collapse_padding=True,
-        pad_edge=False,
-    )
+    table = titled_table(f"cycle {comparison.cycle}")
     for name in ("car", "strategy"):
         table.add_column(name, no_wrap=True)
     for column in columns:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
 from hevopt.mean_value.balances import balances
+from hevopt.output.tables import number, titled_table
 from hevopt.tipin.drive import TipIn
 from hevopt.tipin.figures import DEFINITIONS, GAINED_S, TIMES_S
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
@@ -48,7 +48,7 @@ def engine_table(found: Sequence[TipIn]) -> Table:
     for tip_in in found:
         of = tip_in.figures
         table.add_row(
-            Text(tip_in.case.label), _seconds(of.boost_90_s), _seconds(of.torque_90_s),
+            Text(tip_in.case.label), number(of.boost_90_s, 2), number(of.torque_90_s, 2),
             f"{100 * of.settled_share:.0f}", f"{of.least_excess_air:.2f}",
             f"{of.smoke_limited_s:.2f}", f"{of.surge_margin:.2f}",
             f"{of.turbo_max_radps * RPM_PER_RADPS / 1e3:.0f}", f"{of.exhaust_max_pa / 1e5:.2f}",
@@ -122,13 +122,6 @@ def as_dict(tip_in: TipIn) -> dict[str, Any]:
 
 
 def _table(title: str) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD, title=Text(title, style="table.title") if title else None, title_justify="left",
-        collapse_padding=True, pad_edge=False,
-    )  # fmt: skip
+    table = titled_table(title)
     table.add_column("case", no_wrap=True)
     return table
-
-
-def _seconds(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
