@@ -3,7 +3,7 @@
 Window ends that are points of the curves with a steep rise beyond; curves bent inside the window, up or down;
 flat ones; resistances that rise or fall with charge, or are 0; limits of power and current that bite; powers at
 the voltage's peak; scales of cost, voltage and energy over many orders; ties, costs of 0 and below, switches that
-are dear, forbidden or free, several modes, steps that move a good part of the window or hundreds of them. Switches
+are dear, forbidden or free, fuel for staying in a mode, several modes, steps that move a good part of the window or hundreds of them. Switches
 that take stored energy or give it back, from nothing to more than the window, alike at every step or not.
 """
 
@@ -48,6 +48,9 @@ def _with_switching(rng, table, power_w) -> ControlTable:
     parts = {"switch_energy_j": energy * share * power_w * float(table.step_s.mean())}
     if rng.random() < 0.2:
         parts["switch_fuel_kg"] = table.switch_fuel_kg * rng.uniform(0, 2, whole)
+    if rng.random() < 0.1:
+        kg = parts.get("switch_fuel_kg", table.switch_fuel_kg)
+        parts["switch_fuel_kg"] = kg + np.eye(table.modes) * rng.uniform(0, 2) * kg.max()
     if rng.random() < 0.1:
         forbidden = (rng.random(whole) < 0.2) & ~np.eye(table.modes, dtype=bool)
         parts["switch_allowed"] = table.switch_allowed & ~forbidden
