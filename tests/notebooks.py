@@ -3,6 +3,7 @@
 What is written does not tell when or where it was run: no times, no folders, no versions.
 """
 
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -18,13 +19,16 @@ def executed(path: Path) -> nbformat.NotebookNode:
     """A notebook with the outputs that it has now; an error of a cell is raised."""
     notebook = nbformat.read(path, as_version=4)
     with tempfile.TemporaryDirectory() as folder:
-        NotebookClient(
+        client = NotebookClient(
             notebook,
             timeout=600,
             kernel_name="python3",
             record_timing=False,
             resources={"metadata": {"path": folder}},
-        ).execute()
+        )
+        # A kernel draws into the notebook, whatever whoever runs this draws on.
+        drawn = {k: v for k, v in os.environ.items() if k != "MPLBACKEND"}
+        client.execute(env=drawn)
     notebook.metadata["language_info"] = {"name": "python"}
     return notebook
 

@@ -33,8 +33,12 @@ def test_a_replayed_plan_keeps_its_charge_on_the_way(name):
     assert np.abs(run.soc - soc(run.car.battery, run.planned_j)).max() < 0.003
 
 
-@pytest.mark.parametrize("name", CARS)
-@pytest.mark.parametrize("cycle", ["nedc", "ftp75"])
+@pytest.mark.parametrize(
+    ("name", "cycle"),
+    [(name, "nedc") for name in CARS]
+    + [("C1", "us06"), ("D", "udds")]
+    + [pytest.param(name, "ftp75", marks=pytest.mark.long) for name in CARS],
+)
 def test_every_component_balances_to_rounding(name, cycle):
     run = driven(name, cycle).run
     assert max(run.residual.values()) < 1e-9

@@ -45,8 +45,8 @@ def test_a_second_implementation_in_plain_python_gives_the_same_tip_in():
     plain.hold = plain.road(40 / 3.6) / plain.k / plain.eta
     at_rest = np.array(plain.rates(0.0, list(y[: s.DYNAMIC])))
     assert np.abs(at_rest / scales(y)).max() < 1e-9
-    times = np.arange(0.0, 0.81, 0.1)
-    ours = simulate(in_gear("compact_1300", 4)._replace(drive=RAMP), y, 0.8)
+    times = np.arange(0.0, 0.41, 0.1)
+    ours = simulate(in_gear("compact_1300", 4)._replace(drive=RAMP), y, 0.4)
     theirs = plain.tip_in(list(y[: s.DYNAMIC]), times, 10.0)
     accel = np.array([plain.accel(state) for state in theirs])
     assert np.abs(ours["accel_mps2"][::20] - accel).max() < 2e-5

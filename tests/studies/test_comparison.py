@@ -182,7 +182,7 @@ def test_a_price_on_nox_trades_fuel_for_nox_along_a_convex_front(problem_of):
 
 
 def test_same_input_gives_the_same_bits(problem_of):
-    problem = problem_of("C2", "hwfet")
+    problem = problem_of("C2", "cadc_urban")
     # What learns is tried for the same in tests/strategies.
     for strategy in (strategy for strategy in STRATEGIES.values() if not strategy.learns):
         first, second = (strategy.solve(problem).control for _ in range(2))
