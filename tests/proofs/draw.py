@@ -3,8 +3,9 @@
 Window ends that are points of the curves with a steep rise beyond; curves bent inside the window, up or down;
 flat ones; resistances that rise or fall with charge, or are 0; limits of power and current that bite; powers at
 the voltage's peak; scales of cost, voltage and energy over many orders; ties, costs of 0 and below, switches that
-are dear, forbidden or free, fuel for staying in a mode, several modes, steps that move a good part of the window or hundreds of them. Switches
-that take stored energy or give it back, from nothing to more than the window, alike at every step or not.
+are dear, forbidden or free, fuel for staying in a mode, several modes, steps that move a good part of the window or
+hundreds of them. Switches that take stored energy or give it back, from nothing to more than the window, alike at
+every step or not.
 """
 
 from dataclasses import replace
