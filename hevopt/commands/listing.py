@@ -14,6 +14,14 @@ cycles_app = typer.Typer(
     rich_markup_mode=None,
 )
 
+# Folder of shipped architectures -> what they are; the study's are those that commands take where none is named.
+_GROUPS = {
+    "study": "study: the six of the published study, taken where none is named",
+    "hybrids": "templates: a topology each, to start from",
+    "real": "real: cars that were built, laboratory figures beside them in measured.csv",
+    "tipin": "tip-in: the car of the study's tip-in",
+}
+
 
 @architectures_app.callback(invoke_without_command=True)
 def architectures(context: typer.Context) -> None:
@@ -21,14 +29,18 @@ def architectures(context: typer.Context) -> None:
     if context.invoked_subcommand:
         return
     from hevopt.car_files.load import load_architecture
-    from hevopt.files.lookup import grouped_names, shipped_names
+    from hevopt.files.lookup import groups_of, shipped_names
     from hevopt.strategies import fitting
 
-    for group in (shipped_names("architectures", ".toml"), grouped_names("architectures", ".toml")):
-        width = max(4, *map(len, group))
-        for name in group:
+    groups = {"study": shipped_names("architectures", ".toml")}
+    groups |= groups_of("architectures", ".toml")
+    order = [*_GROUPS, *(group for group in groups if group not in _GROUPS)]
+    width = max(len(name) for names in groups.values() for name in names)
+    for n, group in enumerate(order):
+        write(f"{chr(10) if n else ''}{_GROUPS.get(group, group)}")
+        for name in groups[group]:
             car = load_architecture(name)
-            write(f"{name:{width}} {car.description:45} {', '.join(fitting(car.functions))}")
+            write(f"  {name:{width}} {car.description:54} {', '.join(fitting(car.functions))}")
 
 
 @cycles_app.callback(invoke_without_command=True)

@@ -84,7 +84,12 @@ def shipped_names(kind: str, suffix: str) -> list[str]:
 
 def grouped_names(kind: str, suffix: str) -> list[str]:
     """Names of the shipped files in groups of a kind, which stand for no comparison unless they are named."""
-    return [name for folder in _groups(kind) for name in _names_in(folder, suffix)]
+    return [name for names in groups_of(kind, suffix).values() for name in names]
+
+
+def groups_of(kind: str, suffix: str) -> dict[str, list[str]]:
+    """Group -> names of its shipped files, sorted."""
+    return {folder.name: _names_in(folder, suffix) for folder in _groups(kind)}
 
 
 def _groups(kind: str) -> list[Path]:

@@ -59,7 +59,9 @@ def test_cycles_and_architectures_are_listed(monkeypatch, capsys):
     _, cycles, _ = call(monkeypatch, capsys, "cycles")
     _, cars, _ = call(monkeypatch, capsys, "architectures")
     assert "11.03 km" in cycles and len(cycles.splitlines()) == 9
-    names = [line.split()[0] for line in cars.splitlines()]
+    names = [line.split()[0] for line in cars.splitlines() if line.startswith("  ")]
+    heads = [line.split(":")[0] for line in cars.splitlines() if line and line[0] != " "]
+    assert heads[:3] == ["study", "templates", "real"]
     files = (Path(__file__).parents[2] / "architectures").rglob("*.toml")
     assert names[:6] == ["A", "B", "C1", "C2", "D", "E"]
     assert sorted(names) == sorted(path.stem for path in files if path.parent.name != "components")
