@@ -1,4 +1,4 @@
-"""The real cars: every figure has its source and status, and the wheels take what coefficients and test weight say."""
+"""Real cars: every figure has source and status, and the wheels take what coefficients and test weight say."""
 
 import re
 import tomllib
