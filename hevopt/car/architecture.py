@@ -5,7 +5,7 @@ shipped ones, and a path is relative to the file. Any key of either can be chang
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +21,16 @@ from hevopt.problem.battery import Battery
 Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
 
 
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """A component's size in its unit (l, kW, kWh), mass and price; None where its file gives no figure."""
+
+    size: float
+    unit: str
+    mass_kg: float | None
+    price: float | None
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Architecture(Shown):
     """A complete car: every component, how they are joined and the functions it may use.
@@ -30,6 +40,8 @@ class Architecture(Shown):
     soc_end: least state of charge at the end of a cycle
     contents: keys and values as read, changes made, the components' tables in place of their names
     files: where they were read from, the architecture first
+    weighed: key of engine, machines and battery -> what each weighs and costs
+    added_kg: of the vehicle's mass, what sizes have that changes made others
     """
 
     name: str
@@ -46,6 +58,8 @@ class Architecture(Shown):
     gear: Literal["cycle", "free"]
     contents: Mapping[str, Any]
     files: tuple[Path, ...]
+    weighed: Mapping[str, Weighed] = field(default_factory=dict)
+    added_kg: float = 0.0
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -63,6 +77,12 @@ class Architecture(Shown):
     def source(self) -> Path:
         """The architecture's own file."""
         return self.files[0]
+
+    @property
+    def price(self) -> float | None:
+        """Price of engine, machines and battery together, of those with one; None where none has."""
+        prices = [part.price for part in self.weighed.values() if part.price is not None]
+        return sum(prices) if prices else None
 
     def with_free_gear(self) -> "Architecture":
         """The same car with the engine's gear as a control; DataError where its gearbox does not allow it."""

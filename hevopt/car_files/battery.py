@@ -12,8 +12,10 @@ from hevopt.car_files.fields import (
     NotNegative,
     Number,
     Positive,
+    ScaleFactor,
     Shape,
     Soc,
+    Specific,
     Table,
 )
 from hevopt.files.toml import FileModel
@@ -24,6 +26,12 @@ Ohm = Annotated[Annotated[NotNegative, Number] | Annotated[list[NotNegative], Li
 class LinearVoltageFile(FileModel):
     intercept: Positive
     slope: NotNegative
+
+
+class BatteryScaleFile(FileModel):
+    """Another size of the same cells by one factor of their capacity; see components.py."""
+
+    capacity: ScaleFactor
 
 
 class SocFile(FileModel):
@@ -52,10 +60,12 @@ class SocFile(FileModel):
 
 
 class BatteryFile(FileModel):
-    """A battery of equal cells in series, figures per cell, over SOC where they are lists."""
+    """A battery of equal cells in series and strings of them in parallel, figures per cell, over SOC where they are
+    lists."""
 
     name: Name
     cells_in_series: Annotated[int, Field(ge=1, le=10_000)]
+    parallel: Annotated[int, Field(ge=1, le=1000)] = 1
     capacity_ah: Positive
     open_circuit_v: Annotated[
         Annotated[LinearVoltageFile, Table] | Annotated[list[Positive], List], Shape
@@ -67,6 +77,9 @@ class BatteryFile(FileModel):
     coulombic_efficiency: Fraction = 1.0
     power_max_w: Positive | None = None
     current_max_a: Positive | None = None
+    mass_kgpkwh: Specific | None = None
+    price_pkwh: Specific | None = None
+    scale: BatteryScaleFile | None = None
     soc: SocFile
 
     @model_validator(mode="after")

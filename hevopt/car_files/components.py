@@ -168,18 +168,25 @@ def _loss_map(data: LossMapFile) -> LossMap:
 
 
 def battery_of(data: BatteryFile) -> Battery:
-    """The battery of its file, as one pack of all its cells."""
+    """The battery of its file, as one pack of all its cells.
+
+    Strings in parallel, and cells of another capacity, carry the current together: k times the charge and the
+    limits at equal voltage, 1/k of the resistance.
+    """
     cells = data.cells_in_series
+    size = data.parallel * (1.0 if data.scale is None else data.scale.capacity)
     points = np.array(data.curve_soc or [0.0, 1.0])
     voltage = data.open_circuit_v
     if isinstance(voltage, LinearVoltageFile):
         voltage = list(voltage.intercept + voltage.slope * points)
-    discharge, charge = (np.broadcast_to(r, points.shape) * cells for r in data.resistances())
-    power_max_w = (data.power_max_w or inf) * cells
-    current_max_a = data.current_max_a or inf
+    discharge, charge = (
+        np.broadcast_to(r, points.shape) * cells / size for r in data.resistances()
+    )
+    power_max_w = (data.power_max_w or inf) * cells * size
+    current_max_a = (data.current_max_a or inf) * size
     return Battery(
         points, np.array(voltage) * cells, discharge, charge,
-        data.capacity_ah * TO_SI["_ah"][1], data.coulombic_efficiency,
+        data.capacity_ah * TO_SI["_ah"][1] * size, data.coulombic_efficiency,
         data.soc.min, data.soc.max,
         power_max_w, power_max_w, current_max_a, current_max_a,
     )  # fmt: skip

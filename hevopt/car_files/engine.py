@@ -14,6 +14,7 @@ from hevopt.car_files.fields import (
     NotNegative,
     ScaleFactor,
     ScaleFile,
+    Specific,
     Speeds,
     StartFuel,
     check_grid,
@@ -94,6 +95,8 @@ class EngineFile(FileModel):
     fuel_map: EngineGridFile | None = None
     nox_coefficients: NoxCoefficientsFile | None = None
     mean_value: MeanValueFile | None = None
+    mass_kgpl: Specific | None = None
+    price_pl: Specific | None = None
     scale: EngineScaleFile | None = None
 
     @model_validator(mode="after")

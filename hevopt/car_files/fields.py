@@ -41,6 +41,8 @@ AuxiliaryPower = Annotated[float, Field(ge=0, le=50_000)]
 StartFuel = Annotated[float, Field(ge=0, le=100)]
 ShiftFuel = Annotated[float, Field(ge=0, le=10)]
 ScaleFactor = Annotated[float, Field(ge=0.05, le=20)]
+# Mass or price of a size.
+Specific = Annotated[float, Field(ge=0, le=1e6)]
 
 
 def check_grid(name: str, grid: list[list[float]], rows: int, columns: int) -> None:

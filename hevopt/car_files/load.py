@@ -1,10 +1,11 @@
-"""Carried out of hevopt/architecture.py."""
+"""An architecture from its file and those of its components, with changes of any key made on reading."""
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from hevopt.car.architecture import Architecture
+from hevopt.car.architecture import Architecture, Weighed
 from hevopt.car.driveline import Driveline
 from hevopt.car.machine import Machine
 from hevopt.car.templates import TEMPLATES, WITHOUT_GEARBOX, Options
@@ -18,6 +19,7 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.parts import driveline_of
+from hevopt.car_files.weighing import added_kg, resized, weighed
 from hevopt.errors import DataError
 from hevopt.files.keypaths import merged, with_changes
 from hevopt.files.lookup import find, is_path, shipped_folder
@@ -43,6 +45,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     contents = with_changes(read_contents(path), own)
     data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
+    sizes: dict[str, Weighed] = {}
 
     def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built | None:
         if getattr(data, key) is None:
@@ -53,6 +56,8 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         contents[key] = found.contents
         files.append(found.file)
         file = checked(found.place, found.contents, model)
+        if isinstance(file, EngineFile | MachineFile | BatteryFile):
+            sizes[key] = weighed(file)
         try:
             return build(file)
         except DataError as error:
@@ -60,12 +65,17 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
 
     pack = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
     gearbox = part("gearbox", GearboxFile, gearbox_of)
-    vehicle = part("car", CarFile, lambda file: vehicle_of(file, data.hybrid_mass_kg))
+    bare = part("car", CarFile, lambda file: partial(vehicle_of, file))
     engine = part("engine", EngineFile, engine_of)
     machines = {key: part(key, MachineFile, machine_of) for key in MACHINES}
+    more_kg = _added_kg(path, changes or {}, sizes)
     placed = {key: machine for key, machine in machines.items() if machine is not None}
     # The model has made sure of what every architecture, and every kind of coupling, needs.
-    assert pack is not None and vehicle is not None and engine is not None
+    assert pack is not None and bare is not None and engine is not None
+    try:
+        vehicle = bare(data.hybrid_mass_kg + more_kg)
+    except DataError as error:
+        raise DataError(f"{path}, car: {error}") from None
     battery, soc = pack
     car = Architecture(
         data.name, data.description, vehicle, engine, gearbox, tuple(placed.values()), battery,
@@ -76,8 +86,20 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         gear="cycle",
         contents=contents,
         files=tuple(files),
+        weighed=sizes,
+        added_kg=more_kg,
     )  # fmt: skip
     return car.with_free_gear() if data.gear == "free" else car
+
+
+def _added_kg(path: Path, changes: Mapping[str, Any], sizes: Mapping[str, Weighed]) -> float:
+    """What the sizes of a changed architecture weigh more than its own; 0 where those cannot be told."""
+    if not resized(changes):
+        return 0.0
+    try:
+        return added_kg(load_architecture(path).weighed, sizes)
+    except DataError:
+        return 0.0  # a file that is no car before it is changed has no sizes of its own
 
 
 def _driveline(

@@ -14,6 +14,7 @@ from hevopt.car_files.fields import (
     NotNegative,
     Positive,
     ScaleFile,
+    Specific,
     Speeds,
     check_grid,
 )
@@ -71,6 +72,8 @@ class MachineFile(FileModel):
     loss_c2_ws2: NotNegative | None = None
     loss_c3_wpnm2: NotNegative | None = None
     loss_map: LossMapFile | None = None
+    mass_kgpkw: Specific | None = None
+    price_pkw: Specific | None = None
     scale: ScaleFile | None = None
 
     @model_validator(mode="after")

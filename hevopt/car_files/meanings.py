@@ -120,6 +120,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
                              "m0 + BS p_me (n/2000)^0.19 / 36, n in 1/min, p_me in bar, brake-specific "
                              "BS = lo + (hi - lo) / (1 + exp(-(p_me - p0 - p1 (n/1000 - 2)) / dp)) in g/kWh"),
         "mean_value": ("", "the engine beyond its map, for turbo-lag: gas path, turbocharger, control unit"),
+        "mass_kgpl": ("kg/l", "mass per displacement: what the car gains or loses where another size is asked for"),
+        "price_pl": ("1/l", "price per displacement, in any currency that machine and battery share"),
         "scale": ("", "another size of the same engine by one factor k: at equal speed torque, power, fuel, NOx, "
                   "drag, displacement, inertia and the fuel of a start are k times as large; stroke, speeds and "
                   "mean pressures stay (Willans scaling)"),
@@ -197,6 +199,9 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "loss_c2_ws2": ("W s²", "c2 of the loss"),
         "loss_c3_wpnm2": ("W/(Nm)²", "c3 of the loss"),
         "loss_map": ("", "measured loss of machine and inverter; kind map only"),
+        "mass_kgpkw": ("kg/kW", "mass with inverter per highest power: what the car gains or loses where another "
+                       "size is asked for"),
+        "price_pkw": ("1/kW", "price per highest power, in any currency that engine and battery share"),
         "scale": ("", "another size of the same machine by one factor k: at equal speed torque, power, loss and "
                   "inertia are k times as large, loss(k T) = k loss(T); speeds stay (active length)"),
     },
@@ -213,6 +218,7 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
     "BatteryFile": {
         "name": _NAME,
         "cells_in_series": ("-", "number of cells; all other figures are those of one"),
+        "parallel": ("-", "number of such strings of cells in parallel"),
         "capacity_ah": ("Ah", "charge of a cell"),
         "open_circuit_v": ("V", "of a cell: { intercept, slope } over state of charge, or a list over curve_soc"),
         "resistance_ohm": ("Ω", "of a cell, either direction: one value, or a list over curve_soc"),
@@ -222,11 +228,19 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "coulombic_efficiency": ("-", "share of the charging current that is stored"),
         "power_max_w": ("W", "highest power of a cell, either direction; without it voltage and current limit"),
         "current_max_a": ("A", "highest current, either direction"),
+        "mass_kgpkwh": ("kg/kWh", "mass of the pack per energy from state of charge 0 to 1: what the car gains or "
+                        "loses where another size is asked for"),
+        "price_pkwh": ("1/kWh", "price per that energy, in any currency that engine and machine share"),
+        "scale": ("", "another size of the same cells"),
         "soc": ("", "state of charge: start, window, end"),
     },
     "LinearVoltageFile": {
         "intercept": ("V", "open-circuit voltage of a cell at state of charge 0"),
         "slope": ("V", "its rise from there to state of charge 1"),
+    },
+    "BatteryScaleFile": {
+        "capacity": ("-", "the factor k: capacity and limits of power and current are k times as large, resistance "
+                     "is 1/k; voltage stays"),
     },
     "SocFile": {
         "start": ("-", "state of charge at the start"),

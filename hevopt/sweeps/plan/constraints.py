@@ -1,7 +1,7 @@
-"""Constraints between parameters: comparisons as text, read by a grammar of their own and never executed.
+"""Constraints between parameters, and figures derived from them: texts read by a grammar, never executed.
 
     truth    number < number ...   value == value   value in [constant, ...]   truth and/or truth   not truth
-    number   parameter   1.5   + - * / **   ( )   min(...)   max(...)   abs(...)
+    number   parameter   1.5   + - * / **   ( )   min(...)   max(...)   abs(...)   round(...)
 
 Parameters are written as in the study, dots included. Arithmetic is that of floats, so that no power takes long.
 """
@@ -27,16 +27,17 @@ Part = Callable[[Values], Any]
 _CHARACTERS_MAX = 500
 _DEPTH_MAX = 40
 _ALLOWED = (
-    "allowed: parameters, numbers, texts in quotes, + - * / ** ( ), min, max, abs, "
+    "allowed: parameters, numbers, texts in quotes, + - * / ** ( ), min, max, abs, round, "
     "< <= > >= == !=, in [...], and, or, not"
 )
 # A text in quotes, or a name with its dots; the e of 1e5 is neither.
 _TOKEN = re.compile(
     r"""(?P<text>'[^']*'|"[^"]*")|(?<![\w.])(?P<name>[A-Za-z_]\w*(?:\.\w+)*)""", re.ASCII
 )
-_WORDS = {"and", "or", "not", "in", "min", "max", "abs"}
+_WORDS = {"and", "or", "not", "in", "min", "max", "abs", "round"}
 _PLACEHOLDER = "_{}_"
-_FUNCTIONS: dict[str, Callable[..., float]] = {"min": min, "max": max, "abs": abs}
+_FUNCTIONS: dict[str, Callable[..., float]] = {"min": min, "max": max, "abs": abs, "round": round}
+_OF_ONE = {"abs", "round"}
 _ARITHMETIC: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -70,51 +71,85 @@ class Constraint:
 
     def holds(self, values: Values) -> bool:
         """Whether a design meets it; DataError where its arithmetic has no result."""
-        try:
-            return bool(self.part(values))
-        except (ZeroDivisionError, OverflowError, ValueError) as error:
-            at = ", ".join(f"{printable(n)} = {shown(values[n])}" for n in sorted(self.names))
-            raise DataError(
-                f"{_quoted(self.text)} has no value at {at} ({_reason(error)}); write it so that it "
-                "has one for every design"
-            ) from None
+        return bool(_result(self.text, self.names, self.part, values, "constraint"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expression:
+    """A number that follows from a design's parameters; `names` are the parameters it speaks of."""
+
+    text: str
+    names: frozenset[str]
+    part: Part
+
+    def value(self, values: Values) -> int | float:
+        """The number, whole where it is one; DataError where the arithmetic has no result."""
+        number = float(_result(self.text, self.names, self.part, values, "expression"))
+        return int(number) if number.is_integer() else number
 
 
 def parse(text: str, kinds: Mapping[str, Kind]) -> Constraint:
     """The constraint of a text over parameters of the given kinds; DataError where it is not one."""
-    if len(text) > _CHARACTERS_MAX:
-        raise DataError(
-            f"{_quoted(text)} has {len(text)} characters; allowed: up to {_CHARACTERS_MAX}; split it"
-        )
-    tree, names = _tree(text)
-    if _depth(tree) > _DEPTH_MAX:
-        raise DataError(f"{_quoted(text)} is nested deeper than {_DEPTH_MAX} levels; split it")
-    unknown = [name for name in names.values() if name not in kinds]
-    if unknown:
-        error = unknown_name("parameter", printable(unknown[0]), list(map(printable, kinds)))
-        raise DataError(f"{_quoted(text)}: {error}")
-    try:
-        kind, part = _Compiler(names, kinds).part(tree)
-    except _Fault as fault:
-        raise DataError(f"{_quoted(text)}: {fault}") from None
-    except (ZeroDivisionError, OverflowError, ValueError) as error:
-        raise DataError(f"{_quoted(text)} has no value ({_reason(error)})") from None
+    kind, names, part = _parsed(text, kinds, "constraint")
     if kind != "truth" or not names:
         found = f"it is a {kind}" if kind != "truth" else "it names no parameter"
         raise DataError(
             f"{_quoted(text)}: {found}; a comparison of parameters is needed, such as "
             f"{printable(next(iter(kinds)))} <= 5"
         )
-    return Constraint(text, frozenset(names.values()), part)
+    return Constraint(text, names, part)
+
+
+def expression(text: str, kinds: Mapping[str, Kind]) -> Expression:
+    """The number of a text over parameters of the given kinds; DataError where it is not one."""
+    kind, names, part = _parsed(text, kinds, "expression")
+    if kind != "number":
+        raise DataError(f"{_quoted(text, 'expression')}: it is a {kind}; a number is needed")
+    return Expression(text, names, part)
+
+
+def _result(text: str, names: frozenset[str], part: Part, values: Values, what: str) -> Any:
+    try:
+        return part(values)
+    except (ZeroDivisionError, OverflowError, ValueError) as error:
+        at = ", ".join(f"{printable(n)} = {shown(values[n])}" for n in sorted(names))
+        raise DataError(
+            f"{_quoted(text, what)} has no value at {at} ({_reason(error)}); write it so that it "
+            "has one for every design"
+        ) from None
+
+
+def _parsed(text: str, kinds: Mapping[str, Kind], what: str) -> tuple[Kind, frozenset[str], Part]:
+    """Kind, parameters and function of a text; DataError where the grammar has no such text."""
+    if len(text) > _CHARACTERS_MAX:
+        raise DataError(
+            f"{_quoted(text, what)} has {len(text)} characters; allowed: up to {_CHARACTERS_MAX}; split it"
+        )
+    tree, names = _tree(text, what)
+    if _depth(tree) > _DEPTH_MAX:
+        raise DataError(
+            f"{_quoted(text, what)} is nested deeper than {_DEPTH_MAX} levels; split it"
+        )
+    unknown = [name for name in names.values() if name not in kinds]
+    if unknown:
+        error = unknown_name("parameter", printable(unknown[0]), list(map(printable, kinds)))
+        raise DataError(f"{_quoted(text, what)}: {error}")
+    try:
+        kind, part = _Compiler(names, kinds).part(tree)
+    except _Fault as fault:
+        raise DataError(f"{_quoted(text, what)}: {fault}") from None
+    except (ZeroDivisionError, OverflowError, ValueError) as error:
+        raise DataError(f"{_quoted(text, what)} has no value ({_reason(error)})") from None
+    return kind, frozenset(names.values()), part
 
 
 class _Fault(Exception):
-    """What is wrong with a part of a constraint."""
+    """What is wrong with a part."""
 
 
-def _quoted(text: str) -> str:
+def _quoted(text: str, what: str = "constraint") -> str:
     text = printable(text)
-    return f"constraint {text if len(text) <= 80 else text[:77] + '...'!r}"
+    return f"{what} {text if len(text) <= 80 else text[:77] + '...'!r}"
 
 
 def _reason(error: Exception) -> str:
@@ -123,7 +158,7 @@ def _reason(error: Exception) -> str:
     return "out of range" if isinstance(error, OverflowError) else "not a real number"
 
 
-def _tree(text: str) -> tuple[ast.expr, dict[str, str]]:
+def _tree(text: str, what: str) -> tuple[ast.expr, dict[str, str]]:
     """The syntax tree with a placeholder for each parameter, and placeholder -> parameter."""
     names: dict[str, str] = {}
 
@@ -137,14 +172,16 @@ def _tree(text: str) -> tuple[ast.expr, dict[str, str]]:
         return placeholder
 
     if not text.isprintable() or "\\" in text:
-        raise DataError(f"{_quoted(text)}: printable characters on one line are needed, without \\")
+        raise DataError(
+            f"{_quoted(text, what)}: printable characters on one line are needed, without \\"
+        )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # what Python only warns of, such as `1if`, is a fault
             return ast.parse(_TOKEN.sub(replaced, text).strip(), mode="eval").body, names
     except (SyntaxError, ValueError, Warning, MemoryError, RecursionError):
         hint = "write == for equal; " if re.search(r"(?<![<>=!])=(?!=)", text) else ""
-        raise DataError(f"{_quoted(text)} cannot be read; {hint}{_ALLOWED}") from None
+        raise DataError(f"{_quoted(text, what)} cannot be read; {hint}{_ALLOWED}") from None
 
 
 def _depth(tree: ast.expr) -> int:
@@ -194,7 +231,6 @@ class _Compiler:
         raise _Fault(f"{self.written(node)} is not part of a constraint; {_ALLOWED}")
 
     def of_kind(self, kind: Kind, node: ast.expr) -> Part:
-        """The function of a part that must be of a kind."""
         found, part = self.part(node)
         if found != kind:
             needed = "comparison" if kind == "truth" else kind
@@ -216,8 +252,8 @@ class _Compiler:
         return lambda values: _finite(operation(left(values), right(values)))
 
     def call(self, name: str, arguments: list[ast.expr]) -> Part:
-        if (len(arguments) == 1) != (name == "abs") or not arguments:
-            needed = "one argument" if name == "abs" else "two or more arguments"
+        if (len(arguments) == 1) != (name in _OF_ONE) or not arguments:
+            needed = "one argument" if name in _OF_ONE else "two or more arguments"
             raise _Fault(f"{name} takes {needed}, found {len(arguments)}")
         function, parts = _FUNCTIONS[name], [self.of_kind("number", a) for a in arguments]
         return lambda values: function(*(part(values) for part in parts))
@@ -259,6 +295,6 @@ class _Compiler:
 
 
 def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise OverflowError
-    return value
+    if math.isfinite(value):
+        return value
+    raise OverflowError

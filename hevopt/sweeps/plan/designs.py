@@ -1,7 +1,7 @@
 """The designs of a study: every combination of its values, or a sample, less what constraints exclude."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations_with_replacement, product
 from math import ceil, floor, log2, prod
 from pathlib import Path
@@ -15,6 +15,7 @@ from hevopt.car_files.load import load_architecture
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.files.shown import printable, shown
+from hevopt.sweeps.plan.constraints import Expression
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT
 from hevopt.sweeps.plan.parameters import DESIGNS_MAX, Range, Scalar, Values
 from hevopt.sweeps.plan.study_file import SampleFile, SweepStudy, located_changes
@@ -25,16 +26,19 @@ class Design:
     """A value for every parameter as the study has it, and the study's folder.
 
     number: its place among the designs of the study, from 0
+    derived: key path -> what follows from the values
     """
 
     number: int
     values: Mapping[str, Scalar]
     folder: Path
+    derived: Mapping[str, Expression] = field(default_factory=dict)
 
     @property
     def changes(self) -> dict[str, Scalar]:
         """Key path -> value of what differs from the study's architecture, paths of components being absolute."""
         changed = {key: value for key, value in self.values.items() if key != NOX_WEIGHT}
+        changed |= {key: rule.value(self.values) for key, rule in self.derived.items()}
         return located_changes(self.folder, changed)
 
     @property
@@ -58,6 +62,7 @@ class Designs(Sequence[Design], Shown):
     codes: NDArray[np.int32]
     duplicates: int = 0
     excluded: int = 0
+    derived: Mapping[str, Expression] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.codes)
@@ -71,7 +76,7 @@ class Designs(Sequence[Design], Shown):
             return [self[n] for n in range(*number.indices(len(self)))]
         row = self.codes[number].tolist()
         values = {k: of[c] for k, of, c in zip(self.keys, self.levels, row, strict=True)}
-        return Design(range(len(self))[number], values, self.folder)
+        return Design(range(len(self))[number], values, self.folder, self.derived)
 
 
 def designs_of(study: SweepStudy) -> Designs:
@@ -90,7 +95,7 @@ def designs_of(study: SweepStudy) -> Designs:
         codes = codes[np.sort(np.unique(codes, axis=0, return_index=True)[1])]
     duplicates, distinct = made - len(codes), len(codes)
     codes = codes[_allowed(study, Designs(folder, keys, levels, codes))]
-    designs = Designs(folder, keys, levels, codes, duplicates, distinct - len(codes))
+    designs = Designs(folder, keys, levels, codes, duplicates, distinct - len(codes), study.derived)
     if not len(designs):
         raise DataError(
             f"{study.source}: the constraints exclude each of {distinct} designs; loosen one, or widen "
@@ -106,7 +111,9 @@ def car_of(study: SweepStudy, design: Design) -> Architecture:
     try:
         return load_architecture(study.architecture, design.changes)
     except DataError as error:
-        values = ", ".join(f"{printable(k)} = {shown(v)}" for k, v in design.changes.items())
+        values = ", ".join(
+            f"{printable(k)} = {shown(v)}" for k, v in design.values.items() if k != NOX_WEIGHT
+        )
         raise DataError(
             f"{study.source}: design {design.number} ({values}) is no car: {error}; exclude it by a "
             "constraint, or change the parameters' values"

@@ -1,15 +1,16 @@
 """The file of a sweep: a car, cycles, strategies and parameters, checked in full before anything runs.
 
 `[parameters]` gives each key path of the architecture (`machine.power_max_w`), or `nox_weight`, a list of values
-or a range `{ from, to, count, log }`. A component and keys of it can both be parameters
-where these are quoted: `engine = [...]` and `"engine.idle_rpm" = [...]`. A strategy of one's own is named by
-FILE.py:FUNCTION or MODULE:FUNCTION, which every worker runs. Paths in the file are relative to it; names mean
+or a range `{ from, to, count, log }`. A component and keys of it can both be parameters where these are quoted:
+`engine = [...]` and `"engine.idle_rpm" = [...]`. `[derived]` gives further keys as expressions of the parameters,
+`battery.parallel = "round(machine.scale.power)"`, in the grammar of constraints. A strategy of one's own is named
+by FILE.py:FUNCTION or MODULE:FUNCTION, which every worker runs. Paths in the file are relative to it; names mean
 shipped files.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,8 +24,8 @@ from hevopt.files.lookup import find, is_path
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, faults_of, good_keys, read_contents
 from hevopt.sweeps.plan.brought import brought_of
-from hevopt.sweeps.plan.constraints import Constraint, parse
-from hevopt.sweeps.plan.jobs import BOUND, Brought
+from hevopt.sweeps.plan.constraints import Constraint, Expression, expression, parse
+from hevopt.sweeps.plan.jobs import BOUND, NOX_WEIGHT, Brought
 from hevopt.sweeps.plan.parameters import (
     DESIGNS_MAX,
     Range,
@@ -39,6 +40,7 @@ _PARAMETERS_MAX = 32
 _FAULTS_LISTED, _MODEL_FAULTS = 20, 200
 # The keys of the whole file that may follow a table by mistake, and so fall into it.
 _OF_THE_FILE = ("architecture", "cycles", "strategies", "allow_shortfall", "constraints")
+_TABLES = ("sample", "parameters", "derived")
 _Names = Annotated[list[str], Field(min_length=1, max_length=1000)]
 
 
@@ -58,6 +60,7 @@ class StudyFile(FileModel):
     parameters: Annotated[dict[str, Any], Field(max_length=_PARAMETERS_MAX)]
     sample: SampleFile | None = None
     constraints: Annotated[list[str], Field(default_factory=list, max_length=1000)]
+    derived: Annotated[dict[str, Any], Field(default_factory=dict, max_length=_PARAMETERS_MAX)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +71,7 @@ class SweepStudy:
     parameters: key path of the architecture, or `nox_weight`, -> its values, in order and as written
     sample: None for every combination
     brought: name -> what a worker needs of a strategy from outside; files: in which these stand
+    derived: key path of the architecture -> what follows from the parameters
     """
 
     source: Path
@@ -80,6 +84,7 @@ class SweepStudy:
     constraints: tuple[Constraint, ...]
     brought: Mapping[str, Brought]
     files: tuple[Path, ...]
+    derived: Mapping[str, Expression] = field(default_factory=dict)
 
 
 def read_study(path: str | Path) -> SweepStudy:
@@ -111,14 +116,16 @@ def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
 
         faults += parameter_faults(load, parameters)
     constraints: tuple[Constraint, ...] = ()
+    derived: dict[str, Expression] = {}
     if parameters and len(parameters) == len(contents["parameters"]):
         constraints = _constraints(good.get("constraints", ()), parameters, faults)
+        derived = derived_of(good.get("derived", {}), parameters, faults)
     if faults:
         return None, list(dict.fromkeys(faults))
     data = StudyFile.model_validate(contents)
     return SweepStudy(
         path, architecture, cycles, tuple(data.strategies), data.allow_shortfall,
-        parameters, data.sample, constraints, brought, tuple(files),
+        parameters, data.sample, constraints, brought, tuple(files), derived,
     ), []  # fmt: skip
 
 
@@ -142,7 +149,7 @@ def _raise(path: Path, faults: Sequence[str]) -> None:
 def _without_misplaced(contents: dict[str, Any]) -> list[str]:
     """Take keys of the whole file out of the tables that they fell into; a fault for each."""
     faults = []
-    for table in ("sample", "parameters"):
+    for table in _TABLES:
         inner = contents.get(table)
         if not isinstance(inner, dict):
             continue
@@ -240,3 +247,27 @@ def _constraints(
         except DataError as error:
             faults.append(f"constraints: {error}")
     return tuple(read)
+
+
+def derived_of(
+    given: Mapping[str, Any], parameters: Mapping[str, Values], faults: list[str]
+) -> dict[str, Expression]:
+    """Key path -> expression of the table [derived]; what is wrong with it is added to `faults`."""
+    kinds = {key: kind_of(values) for key, values in parameters.items()}
+    found = {}
+    for key, text in flattened(given):
+        place = f"derived.{printable(key)}"
+        if not isinstance(text, str):
+            faults.append(
+                f'{place} = {shown(text)}: an expression in quotes is needed, such as "2 * {next(iter(kinds))}"'
+            )
+        elif key in parameters or key == NOX_WEIGHT:
+            faults.append(
+                f"{place}: {'a parameter as well; leave one out' if key in parameters else 'no key of a car'}"
+            )
+        else:
+            try:
+                found[key] = expression(text, kinds)
+            except DataError as error:
+                faults.append(f"{place}: {error}")
+    return found

@@ -198,3 +198,43 @@ def test_designs_that_differ_only_in_nox_weight_share_a_group(designs):
         ({"battery.cells_in_series": 96}, [(2, 0.0), (5, 10.0)]),
     ]
     assert groups_of(designs("nox_weight = [0, 10]")) == [({}, [(0, 0.0), (1, 10.0)])]
+
+
+DERIVED = """
+[derived]
+battery.parallel = "round(machine.scale.power)"
+car.mass_kg = "1300 + 10 * machine.scale.power"
+"""
+
+
+def test_derived_keys_follow_from_the_parameters(designs):
+    made = designs("machine.scale.power = [1.0, 2.5]" + DERIVED)
+    assert [d.changes for d in made] == [
+        {"machine.scale.power": 1.0, "battery.parallel": 1, "car.mass_kg": 1310},
+        {"machine.scale.power": 2.5, "battery.parallel": 2, "car.mass_kg": 1325},
+    ]
+    assert made[1].values == {"machine.scale.power": 2.5}
+    car = load_architecture("C2", made[1].changes)
+    assert (
+        car.battery.capacity_as == 2 * 7 * 3600 and type(made[1].changes["battery.parallel"]) is int
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('car.mass_kg = "10 * machine.scale.powr"', "unknown parameter machine.scale.powr; close match"),
+        ('car.mass_kg = "__import__(1)"', "derived.car.mass_kg: expression"),
+        ('car.mass_kg = "machine.scale.power > 1"', "it is a truth; a number is needed"),
+        ("car.mass_kg = 1300", "an expression in quotes is needed"),
+        ('machine.scale.power = "2"', "derived.machine.scale.power: a parameter as well"),
+        ('nox_weight = "machine.scale.power"', "derived.nox_weight: no key of a car"),
+        ('car.mas_kg = "1300"', "unknown key mas_kg"),
+        ('car.mass_kg = "1300 / (machine.scale.power - 1)"', "has no value at machine.scale.power = 1.0"),
+        ('battery.parallel = "machine.scale.power / 2"', "parallel = 0.5"),
+    ],
+)  # fmt: skip
+def test_a_wrong_expression_is_one_message(designs, line, words):
+    with pytest.raises(DataError) as found:
+        designs(f"machine.scale.power = [1.0, 2.0]\n[derived]\n{line}")
+    assert words in str(found.value) and "\n" not in str(found.value)
