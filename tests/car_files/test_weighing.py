@@ -76,7 +76,6 @@ def test_parallel_cells_and_larger_ones_are_the_same_battery_and_as_good_as_more
     [
         ({"battery.parallel": 1.5}, "parallel = 1.5"),
         ({"battery.scale.capacity": 0.0}, "scale.capacity = 0.0; allowed: 0.05 to 20"),
-        ({"battery.scale": {"power": 2}}, "scale.power"),
         ({"machine.mass_kgpkw": -1}, "mass_kgpkw = -1; allowed: 0 to"),
         ({"engine.scale.torque": 0.05, "car.mass_kg": 50, "engine.mass_kgpl": 125}, "allowed: 50 kg or more"),
     ],
