@@ -10,6 +10,7 @@ from hevopt.car.driveline import Driveline
 from hevopt.car.machine import Machine
 from hevopt.car.templates import TEMPLATES, WITHOUT_GEARBOX, Options
 from hevopt.car.transmission import Gearbox
+from hevopt.car.vehicle import Vehicle
 from hevopt.car_files.architecture import ArchitectureFile
 from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
@@ -19,12 +20,12 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.parts import driveline_of
-from hevopt.car_files.weighing import added_kg, resized, weighed
+from hevopt.car_files.weighing import WEIGHED, added_kg, resized, weighed
 from hevopt.errors import DataError
 from hevopt.files.keypaths import merged, with_changes
 from hevopt.files.lookup import find, is_path, shipped_folder
 from hevopt.files.shown import printable, shown
-from hevopt.files.toml import Model, checked, read_contents
+from hevopt.files.toml import FileModel, Model, checked, read_contents
 from hevopt.units import TO_SI
 
 Built = TypeVar("Built")
@@ -45,7 +46,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     contents = with_changes(read_contents(path), own)
     data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
-    sizes: dict[str, Weighed] = {}
+    files_of: dict[str, FileModel] = {}
 
     def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built | None:
         if getattr(data, key) is None:
@@ -56,8 +57,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         contents[key] = found.contents
         files.append(found.file)
         file = checked(found.place, found.contents, model)
-        if isinstance(file, EngineFile | MachineFile | BatteryFile):
-            sizes[key] = weighed(file)
+        files_of[key] = file
         try:
             return build(file)
         except DataError as error:
@@ -68,17 +68,15 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     bare = part("car", CarFile, lambda file: partial(vehicle_of, file))
     engine = part("engine", EngineFile, engine_of)
     machines = {key: part(key, MachineFile, machine_of) for key in MACHINES}
+    sizes = {key: weighed(file) for key, file in files_of.items() if key in WEIGHED}
     more_kg = _added_kg(path, changes or {}, sizes)
     placed = {key: machine for key, machine in machines.items() if machine is not None}
     # The model has made sure of what every architecture, and every kind of coupling, needs.
     assert pack is not None and bare is not None and engine is not None
-    try:
-        vehicle = bare(data.hybrid_mass_kg + more_kg)
-    except DataError as error:
-        raise DataError(f"{path}, car: {error}") from None
     battery, soc = pack
     car = Architecture(
-        data.name, data.description, vehicle, engine, gearbox, tuple(placed.values()), battery,
+        data.name, data.description, _with_mass(path, bare, data.hybrid_mass_kg + more_kg),
+        engine, gearbox, tuple(placed.values()), battery,
         soc_start=soc.start,
         soc_end=soc.start if soc.end is None else soc.end,
         driveline=_driveline(path, data, gearbox, placed),
@@ -90,6 +88,13 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         added_kg=more_kg,
     )  # fmt: skip
     return car.with_free_gear() if data.gear == "free" else car
+
+
+def _with_mass(path: Path, bare: Callable[[float], Vehicle], hybrid_mass_kg: float) -> Vehicle:
+    try:
+        return bare(hybrid_mass_kg)
+    except DataError as error:
+        raise DataError(f"{path}, car: {error}") from None
 
 
 def _added_kg(path: Path, changes: Mapping[str, Any], sizes: Mapping[str, Weighed]) -> float:

@@ -13,13 +13,14 @@ from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.components import battery_of
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.machine import MachineFile
+from hevopt.files.toml import FileModel
 
 _CM3_PER_LITRE, _W_PER_KW, _J_PER_KWH = 1e3, 1e3, 3.6e6
 OWN_MASS = "hybrid_mass_kg"
 WEIGHED = ("engine", "machine", "machine_2", "machine_3", "battery")
 
 
-def weighed(file: EngineFile | MachineFile | BatteryFile) -> Weighed:
+def weighed(file: FileModel) -> Weighed:
     """Size, mass and price of a component by its file."""
     if isinstance(file, EngineFile):
         factor = 1.0 if file.scale is None else file.scale.factor
@@ -30,6 +31,7 @@ def weighed(file: EngineFile | MachineFile | BatteryFile) -> Weighed:
         return _weighed(
             factor * file.power_max_w / _W_PER_KW, "kW", file.mass_kgpkw, file.price_pkw
         )
+    assert isinstance(file, BatteryFile)  # only components of WEIGHED are asked
     kwh = float(battery_of(file).point_energy_j[-1]) / _J_PER_KWH
     return _weighed(kwh, "kWh", file.mass_kgpkwh, file.price_pkwh)
 
