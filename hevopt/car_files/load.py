@@ -10,7 +10,6 @@ from hevopt.car.driveline import Driveline
 from hevopt.car.machine import Machine
 from hevopt.car.templates import TEMPLATES, WITHOUT_GEARBOX, Options
 from hevopt.car.transmission import Gearbox
-from hevopt.car.vehicle import Vehicle
 from hevopt.car_files.architecture import ArchitectureFile
 from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
@@ -28,7 +27,7 @@ from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, Model, checked, read_contents
 from hevopt.units import TO_SI
 
-Built = TypeVar("Built")
+Built, Given = TypeVar("Built"), TypeVar("Given")
 
 
 COMPONENTS = ("car", "engine", "gearbox", "machine", "machine_2", "machine_3", "battery")
@@ -58,10 +57,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         files.append(found.file)
         file = checked(found.place, found.contents, model)
         files_of[key] = file
-        try:
-            return build(file)
-        except DataError as error:
-            raise DataError(f"{found.place}: {error}") from None
+        return _built(found.place, build, file)
 
     pack = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
     gearbox = part("gearbox", GearboxFile, gearbox_of)
@@ -75,7 +71,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     assert pack is not None and bare is not None and engine is not None
     battery, soc = pack
     car = Architecture(
-        data.name, data.description, _with_mass(path, bare, data.hybrid_mass_kg + more_kg),
+        data.name, data.description, _built(f"{path}, car", bare, data.hybrid_mass_kg + more_kg),
         engine, gearbox, tuple(placed.values()), battery,
         soc_start=soc.start,
         soc_end=soc.start if soc.end is None else soc.end,
@@ -90,11 +86,11 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     return car.with_free_gear() if data.gear == "free" else car
 
 
-def _with_mass(path: Path, bare: Callable[[float], Vehicle], hybrid_mass_kg: float) -> Vehicle:
+def _built(place: str, build: Callable[[Given], Built], file: Given) -> Built:
     try:
-        return bare(hybrid_mass_kg)
+        return build(file)
     except DataError as error:
-        raise DataError(f"{path}, car: {error}") from None
+        raise DataError(f"{place}: {error}") from None
 
 
 def _added_kg(path: Path, changes: Mapping[str, Any], sizes: Mapping[str, Weighed]) -> float:
