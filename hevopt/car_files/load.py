@@ -27,7 +27,8 @@ from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, Model, checked, read_contents
 from hevopt.units import TO_SI
 
-Built, Given = TypeVar("Built"), TypeVar("Given")
+Built = TypeVar("Built")
+Given = TypeVar("Given")
 
 
 COMPONENTS = ("car", "engine", "gearbox", "machine", "machine_2", "machine_3", "battery")

@@ -28,7 +28,11 @@ _OURS = "#:"
 _WIDTH = 110
 _MEGABYTES_MAX = 5
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}")
-_EXAMPLES = {"EngineFile": "{ displacement = 1.25 }", "MachineFile": "{ power = 1.25 }"}
+_EXAMPLES = {
+    "EngineFile": "{ displacement = 1.25 }",
+    "MachineFile": "{ power = 1.25 }",
+    "BatteryFile": "{ capacity = 1.25 }",
+}
 
 
 class Notes(NamedTuple):
