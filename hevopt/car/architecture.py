@@ -35,6 +35,7 @@ class Weighed:
 class Architecture(Shown):
     """A complete car: every component, how they are joined and the functions it may use.
 
+    engine: `no_engine` in a car that has none
     gearbox: with the shift speeds; None without one whose gear the cycle lists
     machines: in the order of the driveline's
     soc_end: least state of charge at the end of a cycle
@@ -72,6 +73,16 @@ class Architecture(Shown):
             "gear": self.gear,
             "source": self.source,
         }
+
+    @property
+    def electric(self) -> bool:
+        """Whether nothing but electricity drives it; its engine is then `no_engine`."""
+        return self.driveline.engine is None
+
+    @property
+    def marks(self) -> frozenset[str]:
+        """What strategies may need or not suit: its functions, and "electric" without an engine."""
+        return self.functions | ({"electric"} if self.electric else frozenset())
 
     @property
     def source(self) -> Path:

@@ -15,12 +15,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car.engine_laws import EngineLaw
+from hevopt.car.engine_laws import EngineLaw, NoFuelLaw
 from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 # Least that the best efficiency counts: what is divided by it stays finite.
 _EFFICIENCY_MIN = 0.01
+# What a car without an engine counts a joule of electricity as: fuel of so many J/kg. Any figure makes the same
+# plan least; that of diesel keeps costs at the size of others.
+ELECTRICITY_JPKG = 42.9e6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -112,6 +115,22 @@ class Engine(Shown):
         fuel_w = self.heating_value_jpkg * self.fuel_kgps(torque, speed)
         efficiency = torque * speed / np.where(fuel_w > 0, fuel_w, np.inf)
         return max(float(np.nanmax(efficiency)), _EFFICIENCY_MIN)
+
+
+def no_engine() -> Engine:
+    """What stands for the engine of a car that has none: it burns nothing and no shaft turns with it."""
+    return Engine(
+        name="none",
+        idle_radps=0.0,
+        inertia_kgm2=0.0,
+        start_fuel_kg=0.0,
+        heating_value_jpkg=ELECTRICITY_JPKG,
+        fuel_density_kgpm3=835.0,
+        co2_kgpkg=0.0,
+        full_load_speed_radps=np.array([0.0, 1.0]),
+        full_load_torque_nm=np.zeros(2),
+        law=NoFuelLaw(),
+    )
 
 
 @lru_cache(maxsize=64)

@@ -76,6 +76,38 @@ class NoxCoefficients:
     dp: float
 
 
+@dataclass(frozen=True, slots=True)
+class NoFuelLaw:
+    """That of a car without an engine: nothing is burnt, whatever is asked."""
+
+    nox_known: bool = False
+    lowest_nm: float = 0.0
+
+    def fuel_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
+        """None."""
+        return np.zeros(np.broadcast_shapes(np.shape(torque_nm), np.shape(speed_radps)))
+
+    def nox_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
+        """None."""
+        return self.fuel_kgps(torque_nm, speed_radps)
+
+    def drag_nm(self, speed_radps: Array) -> Array:
+        """None."""
+        return np.zeros(np.shape(speed_radps))
+
+    def covered_nm(self, full_load_nm: Array, speed_radps: Array) -> Array:
+        """None."""
+        return np.zeros(np.shape(full_load_nm))
+
+    def near_edge(self, torque_nm: Array, speed_radps: Array, share: float) -> Flags:
+        """Nowhere."""
+        return self.fuel_kgps(torque_nm, speed_radps) > 0
+
+    def scaled(self, factor: float) -> "NoFuelLaw":
+        """The same."""
+        return self
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class CompactLaw(Shown):
     """Fuel and NOx by coefficients over mean pressure and mean piston speed.

@@ -12,6 +12,7 @@ power_split              engine on the carrier of a planetary set, machine on it
 series                   machine on the engine's shaft; machine_2, by the final drive, on the wheels
 series_parallel          the same, and a lock-up clutch that joins engine and wheels by a gear of its own
 belt_and_axle    P0+P4   machine on the crankshaft, gearbox and clutch as above; machine_2 on the other axle
+electric                 the machine, by the final drive, on the wheels; no engine
 parts                    the parts as the file lists them
 """
 
@@ -27,7 +28,7 @@ from hevopt.car.transmission import Gearbox as GearboxData
 
 CouplingKind = Literal[
     "none", "belt", "crankshaft", "gearbox_input", "gearbox_output", "even_shaft", "belt_and_axle", "power_split",
-    "series", "series_parallel", "parts",
+    "series", "series_parallel", "electric", "parts",
 ]  # fmt: skip
 _CRANK, _INPUT = "crankshaft", "gearbox input"
 
@@ -135,6 +136,16 @@ def series(kind: str, options: Options) -> Driveline:
     return Driveline(kind, parts, _CRANK, placed, free_engine_speed=True)
 
 
+def electric(kind: str, options: Options) -> Driveline:
+    """The machine alone drives; there is no engine."""
+    parts = (
+        Gear(
+            "final drive", "motor", WHEEL, options.final_drive_ratio, options.final_drive_efficiency
+        ),
+    )
+    return Driveline(kind, parts, None, (("machine", "motor"),))
+
+
 def series_parallel(kind: str, options: Options) -> Driveline:
     """A series car whose engine's shaft a clutch of the strategy joins to the wheels."""
     line = series(kind, options)
@@ -172,12 +183,14 @@ WITHOUT_GEARBOX: dict[str, Callable[[str, Options], Driveline]] = {
     "power_split": power_split,
     "series": series,
     "series_parallel": series_parallel,
+    "electric": electric,
 }
 # The components that a kind has beside car and battery; those of "parts" follow from its shafts.
 COMPONENTS_OF: dict[str, frozenset[str]] = {
     **dict.fromkeys(TEMPLATES, frozenset({"engine", "gearbox", "machine"})),
     "belt_and_axle": frozenset({"engine", "gearbox", "machine", "machine_2"}),
     **dict.fromkeys(WITHOUT_GEARBOX, frozenset({"engine", "machine", "machine_2"})),
+    "electric": frozenset({"machine"}),
 }
 
 

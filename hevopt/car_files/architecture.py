@@ -56,6 +56,10 @@ class ArchitectureFile(FileModel):
             needed = set(COMPONENTS_OF[kind])
         if missing := sorted(needed - given):
             raise ValueError(f"coupling kind {kind!r} needs {', '.join(missing)}")
+        if "engine" not in given and "gearbox" in given:
+            raise ValueError(
+                "a gearbox with listed gears needs an engine; without one leave it out"
+            )
         if extra := sorted(given - needed):
             how = "; say on which shaft, such as machine_2_shaft" if kind == "parts" else ""
             raise ValueError(f"coupling kind {kind!r} does not use {', '.join(extra)}{how}")

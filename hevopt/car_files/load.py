@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from hevopt.car.architecture import Architecture, Weighed
 from hevopt.car.driveline import Driveline
+from hevopt.car.engine import no_engine
 from hevopt.car.machine import Machine
 from hevopt.car.templates import TEMPLATES, WITHOUT_GEARBOX, Options
 from hevopt.car.transmission import Gearbox
@@ -69,11 +70,11 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     more_kg = _added_kg(path, changes or {}, sizes)
     placed = {key: machine for key, machine in machines.items() if machine is not None}
     # The model has made sure of what every architecture, and every kind of coupling, needs.
-    assert pack is not None and bare is not None and engine is not None
+    assert pack is not None and bare is not None
     battery, soc = pack
     car = Architecture(
         data.name, data.description, _built(f"{path}, car", bare, data.hybrid_mass_kg + more_kg),
-        engine, gearbox, tuple(placed.values()), battery,
+        engine or no_engine(), gearbox, tuple(placed.values()), battery,
         soc_start=soc.start,
         soc_end=soc.start if soc.end is None else soc.end,
         driveline=_driveline(path, data, gearbox, placed),

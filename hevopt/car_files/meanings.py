@@ -30,7 +30,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
                  "input, gearbox output, the even shaft of a dual clutch gearbox; or power_split (machine on the "
                  "sun, machine_2 on the ring, engine on the carrier), series (machine on the engine's shaft, "
                  "machine_2 drives), series_parallel (and a lock-up clutch), belt_and_axle (machine on the "
-                 "engine, machine_2 on the other axle); or parts, listed one by one"),
+                 "engine, machine_2 on the other axle), electric (the machine alone, no engine); "
+                 "or parts, listed one by one"),
         "second_clutch": ("", "a clutch between engine and machine, so that electric driving does not drag "
                           "the engine; kind gearbox_input only"),
         "machine_ratio": ("-", "machine speed over gearbox output speed; kind gearbox_output only"),

@@ -32,10 +32,19 @@ def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
     engine = shafts.get("engine")
     line = Driveline("parts", parts, engine, machines, engine is not None and not driven)
     _check_joined(parts, shafts)
+    if engine is None and (chosen := [part.name for part in parts if _is_chosen(part)]):
+        raise DataError(
+            f"driveline: without an engine gears may not be chosen: {', '.join(chosen)}; the objective, "
+            "electricity, does not count their changes; take one pair of gears instead"
+        )
     for state in line.states():
         for phase in _phases(line):
             way(line, state, phase)
     return line
+
+
+def _is_chosen(part: Part) -> bool:
+    return isinstance(part, Gearbox | Clutch | OneWayClutch | ShaftBrake)
 
 
 def _check_joined(parts: tuple[Part, ...], placed: Mapping[str, str]) -> None:

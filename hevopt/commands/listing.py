@@ -40,7 +40,7 @@ def architectures(context: typer.Context) -> None:
         write(f"{chr(10) if n else ''}{_GROUPS.get(group, group)}")
         for name in groups[group]:
             car = load_architecture(name)
-            write(f"  {name:{width}} {car.description:54} {', '.join(fitting(car.functions))}")
+            write(f"  {name:{width}} {car.description:54} {', '.join(fitting(car.marks))}")
 
 
 @cycles_app.callback(invoke_without_command=True)

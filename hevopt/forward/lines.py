@@ -85,7 +85,7 @@ def _check(car: Architecture) -> None:
     line, lacking = car.driveline, ""
     odd = [part.name for part in line.parts if not isinstance(part, Gear | Gearbox | Clutch)]
     odd += [p.name for p in line.parts if isinstance(p, Clutch) and p.operation != "driver"]
-    if line.engine is None or car.engine is None or not line.boxes or not line.driver_clutches:
+    if line.engine is None or not line.boxes or not line.driver_clutches:
         lacking = "it has no engine behind a driver's clutch and gears"
     elif line.free_engine_speed:
         lacking = "its engine's speed is free"

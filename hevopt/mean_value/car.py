@@ -37,7 +37,7 @@ def car_in_gear(architecture: Architecture, diesel: Diesel, found: Paths) -> Car
     vehicle, engine = architecture.vehicle, architecture.engine
     torque = curve_of(diesel.curves, FULL_LOAD)[1]
     return Car(
-        engine_inertia_kgm2=(0.0 if engine is None else engine.inertia_kgm2) + found.crank_kgm2,
+        engine_inertia_kgm2=engine.inertia_kgm2 + found.crank_kgm2,
         mass_kg=vehicle.equivalent_mass_kg + found.wheel_kgm2 / vehicle.tyre_radius_m**2,
         resistance_n=(
             vehicle.rolling_n[0] + vehicle.air_n[0],

@@ -39,7 +39,7 @@ def paths(architecture: Architecture, gear: int, speed_mps: float) -> Paths:
     """
     driveline = architecture.driveline
     box = next((box for box in driveline.boxes if gear in box.gears and box.choice != "free"), None)
-    if architecture.engine is None or driveline.engine is None or box is None:
+    if driveline.engine is None or box is None:
         gears = sorted({g for box in driveline.boxes if box.choice != "free" for g in box.gears})
         known = f"gears {gears[0]} to {gears[-1]}" if gears else "no gearbox that follows a gear"
         raise DataError(

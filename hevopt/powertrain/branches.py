@@ -61,7 +61,7 @@ class Branch(Shown):
 
 def branches(car: Architecture, demand: Demand, levels: int, around: Around | None) -> list[Branch]:
     """The branches of a car: engine turning first, with a free gear gear by gear."""
-    may_stop = bool(car.functions & {"start_stop", "power_management"}) or car.engine is None
+    may_stop = bool(car.functions & {"start_stop", "power_management"}) or car.electric
     found = []
     for state, driver in _states(car, demand):
         if state.engine_on or may_stop:

@@ -147,8 +147,7 @@ def _flows(here: Setting, torques: Mapping[str, Array]) -> dict[str, Array]:
     shafts, burnt, none = here.shafts, flowing(here, torques), np.zeros((1, 1))
     engine_speed = here.engine_radps[:, None]
     engine_torque = torques.get(ENGINE, none)
-    heating_value = 0.0 if here.car.engine is None else here.car.engine.heating_value_jpkg
-    fuel_power = burnt.fuel_kgps * heating_value
+    fuel_power = burnt.fuel_kgps * here.car.engine.heating_value_jpkg
     machine_w = none
     for name in here.machines:
         machine_w = machine_w + torques[name] * here.speed_radps(name)[:, None]

@@ -96,8 +96,8 @@ class Jumps:
         engine, machines = car.engine, car.machines
         self._each = np.array([machine.spin_efficiency for machine in machines])
         self._start = max(self._each, default=_STARTER_EFFICIENCY)
-        self.heat_jpkg = 1.0 if engine is None else engine.heating_value_jpkg
-        self._work_jpkg = 1.0 if engine is None else engine.best_efficiency * self.heat_jpkg
+        self.heat_jpkg = engine.heating_value_jpkg
+        self._work_jpkg = engine.best_efficiency * self.heat_jpkg
 
     def taken(self, before: Kinetic, after: Kinetic, first: Kinetic, *, runs: bool) -> Taken:
         """(time,) what each step takes whose state is `after`, the step before having been in `before`.

@@ -65,7 +65,7 @@ def _fuel_kg(car: Architecture, before: State, after: State) -> float:
     """What a start, and a change of gears, counts beside the shafts' energy."""
     costs = {box.name: box.shift_fuel_kg for box in car.driveline.boxes}
     fuel_kg = sum(costs[name] for name, gear in after.gears if (name, gear) not in before.gears)
-    if car.engine is not None and after.engine_on and not before.engine_on:
+    if after.engine_on and not before.engine_on:
         fuel_kg += car.engine.start_fuel_kg
     if car.gearbox is not None and before.listed != after.listed and before.listed and after.listed:
         fuel_kg += car.gearbox.shift_fuel_kg or 0.0

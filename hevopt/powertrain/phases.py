@@ -50,7 +50,7 @@ class Stretch(NamedTuple):
 def driver_of(car: Architecture, demand: Demand) -> Driver:
     """The driver of a car on a demand."""
     launch, gap = np.zeros(len(demand.gear)), np.zeros(len(demand.gear))
-    if car.engine is not None and car.gearbox is not None:
+    if not car.electric and car.gearbox is not None:
         launch = launch_speed_radps(demand, car.engine, car.gearbox)
         if car.gear == "cycle" and car.gearbox.shift_gap_s > 0:
             gap = gap_shares(demand, car.vehicle, car.engine, car.gearbox)

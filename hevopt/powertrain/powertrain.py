@@ -10,6 +10,7 @@ torques in torques.py, what limits leave of the controls in rejects.py: one engi
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.engine import ELECTRICITY_JPKG
 from hevopt.driving.cycle import Cycle
 from hevopt.driving.demand import Demand, demand_of
 from hevopt.driving.driver import change_down
@@ -56,10 +57,11 @@ def build_problem(
         architecture, demand, levels=levels, allow_shortfall=allow_shortfall, around=around
     )
     problem = Problem(
-        table, architecture.battery, architecture.soc_start, architecture.soc_end, 0, nox_weight
-    )
+        table, architecture.battery, architecture.soc_start, architecture.soc_end, 0, nox_weight,
+        1 / ELECTRICITY_JPKG if architecture.electric else 0.0,
+    )  # fmt: skip
     engine = architecture.engine
-    return problem if engine is None else with_dwell(problem, engine.least_on_s, engine.least_off_s)
+    return with_dwell(problem, engine.least_on_s, engine.least_off_s)
 
 
 def build_table(

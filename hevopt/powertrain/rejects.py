@@ -93,7 +93,7 @@ def function_rejects(
     wanted, standing = here.shafts.wheel_nm[:, None], _standing(here)[:, None]
     banned = np.zeros((1, 1), dtype=bool)
     if not state.engine_on:
-        if here.car.engine is not None:
+        if not here.car.electric:
             banned = (standing & (not has("start_stop"))) | (
                 ~standing & (not has("power_management"))
             )

@@ -106,7 +106,7 @@ def placed(car: Architecture) -> list[tuple[int | None, float, str]]:
             zip(car.machines, car.driveline.machines, strict=True)
         )
     ]
-    if car.engine is not None and car.driveline.engine is not None:
+    if car.driveline.engine is not None:
         found.append((None, car.engine.inertia_kgm2, car.driveline.engine))
     return found
 

@@ -31,7 +31,8 @@ class Problem(Shown):
     soc_end_min: state of charge that must at least be left at the end
     start_mode: mode before the first step
     nox_weight: kg of fuel that a kg of NOx counts
-    cost_kg: (time, control) what a step counts: fuel plus weighted NOx
+    electricity_kgpj: kg of fuel that a joule from the battery's terminals counts; 0 but in a car without an engine
+    cost_kg: (time, control) what a step counts: fuel plus weighted NOx and electricity
     start_j, end_min_j, window_j: stored energy before the first step, least at the end, at the window's ends
     A control whose power the battery cannot deliver or take at every state of charge of its window is rejected.
     """
@@ -42,6 +43,7 @@ class Problem(Shown):
     soc_end_min: float
     start_mode: int = 0
     nox_weight: float = 0.0
+    electricity_kgpj: float = 0.0
     cost_kg: Array = field(init=False)
     start_j: float = field(init=False)
     end_min_j: float = field(init=False)
@@ -70,6 +72,10 @@ class Problem(Shown):
         cost_kg = self.table.fuel_kg
         if self.nox_weight != 0:
             cost_kg = cost_kg + self.nox_weight * self.table.nox_kg
+            cost_kg.flags.writeable = False
+        if self.electricity_kgpj != 0:
+            terminal_j = self.table.battery_power_w * self.table.step_s[:, None]
+            cost_kg = cost_kg + self.electricity_kgpj * terminal_j
             cost_kg.flags.writeable = False
         socs = np.array(
             [self.soc_start, self.soc_end_min, self.battery.soc_min, self.battery.soc_max]

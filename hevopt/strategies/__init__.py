@@ -57,6 +57,8 @@ class Strategy(NamedTuple):
 _HYBRID = frozenset({"power_management"})
 _STOP = frozenset({"start_stop"})
 _NONE: frozenset[str] = frozenset()
+# A car without an engine: nothing to start and to shift, whose charge ends as it is driven.
+_ELECTRIC = frozenset({"electric"})
 _RULE = "present step; its parameters are calibrated on the cycle"
 
 STRATEGIES: dict[str, Strategy] = {
@@ -64,27 +66,39 @@ STRATEGIES: dict[str, Strategy] = {
         baseline.solve, "present step", _NONE, _STOP | _HYBRID, causal=True, start=baseline.start
     ),
     "start_stop": Strategy(start_stop.solve, _RULE, _STOP, _HYBRID, start=start_stop.start),
-    "conventional": Strategy(conventional.solve, _RULE, _HYBRID, start=conventional.start),
-    "nox_cut": Strategy(nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}, start=nox_cut.start),
+    "conventional": Strategy(
+        conventional.solve, _RULE, _HYBRID, _ELECTRIC, start=conventional.start
+    ),
+    "nox_cut": Strategy(
+        nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}, _ELECTRIC, start=nox_cut.start
+    ),
     "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
     "dp": Strategy(dp.solve, "whole cycle", _STOP),
-    "convex": Strategy(convex.solve, "whole cycle", _HYBRID, usual=False),
+    "convex": Strategy(convex.solve, "whole cycle", _HYBRID, _ELECTRIC, usual=False),
     "mpc": Strategy(
         mpc.solve,
         "20 s ahead, or --horizon",
         _HYBRID,
+        _ELECTRIC,
         causal=True,
         usual=False,
         previews=True,
         start=mpc.start,
     ),
     "a_ecms": Strategy(
-        a_ecms.solve, "past and present", _HYBRID, causal=True, usual=False, start=a_ecms.start
+        a_ecms.solve,
+        "past and present",
+        _HYBRID,
+        _ELECTRIC,
+        causal=True,
+        usual=False,
+        start=a_ecms.start,
     ),
     "sdp": Strategy(
         sdp.solve,
         "past and present; other cycles",
         _HYBRID,
+        _ELECTRIC,
         causal=True,
         usual=False,
         learns=True,
@@ -164,7 +178,8 @@ def chosen(wanted: Any) -> tuple[list[str] | None, dict[str, Strategy]]:
 
 
 def fitting(functions: frozenset[str], *, every: bool = False) -> list[str]:
-    """Names of the strategies that make sense for an architecture's functions: the usual ones, or every one."""
+    """Names of the strategies that make sense for an architecture's functions or `marks`: the usual ones, or every
+    one."""
     return [
         name
         for name, strategy in every_strategy().items()

@@ -23,7 +23,8 @@ _ROUNDING_J = 1.0
 @dataclass(frozen=True, slots=True, repr=False)
 class Row(Shown):
     """One architecture and strategy. None where a case failed, or where there is nothing to compare with:
-    no reference, no fuel, or a bound of 0; of NOx also where the engine has no data on it.
+    no reference, no fuel, or a bound of 0; bound and corrected fuel of a car without an engine, whose gap is that
+    of its electricity at the battery's terminals; of NOx also where the engine has no data on it.
 
     status: its marks, or why it has no figures
     delta_energy_percent: stored energy at the end above what is asked, as a share of the fuel's;
@@ -80,11 +81,12 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
     surplus_j = trajectory.end_j - problem.end_min_j
     fuel_j = fuel_kg * car.engine.heating_value_jpkg
     bound_kg, proof = certificate.bound_of(trajectory)
+    corrected_kg = fuel_kg - certificate.price_kgpj * surplus_j
 
     return Row(
         architecture=car.name,
         strategy=strategy,
-        status=_status(problem, surplus_j, fuel_j),
+        status=_status(problem, surplus_j, fuel_j, electric=car.electric),
         fuel_l_per_100km=litres(car, cycle, fuel_kg),
         co2_g_per_km=fuel_kg * car.engine.co2_kgpkg * 1e3 / km,
         nox_mg_per_km=trajectory.total_nox_kg * 1e6 / km if car.engine.nox_known else None,
@@ -92,9 +94,9 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
         soc_end=float(trajectory.soc[-1]),
         delta_energy_percent=_percent(surplus_j, fuel_j),
         electricity_kwh_per_100km=(problem.start_j - trajectory.end_j) / 3.6e6 / km * 100,
-        fuel_corrected_l_per_100km=litres(car, cycle, fuel_kg - certificate.price_kgpj * surplus_j),
+        fuel_corrected_l_per_100km=None if car.electric else litres(car, cycle, corrected_kg),
         engine_starts=engine_starts(problem, trajectory),
-        bound_l_per_100km=litres(car, cycle, bound_kg),
+        bound_l_per_100km=None if car.electric else litres(car, cycle, bound_kg),
         gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
         certificate=Claim(proof),
         solve_s=solve_s,
@@ -154,9 +156,10 @@ def end_asked_text(end_asked: Mapping[str, float]) -> str:
     return "; ".join(f"{soc:g} in {', '.join(names)}" for soc, names in cars.items())
 
 
-def _status(problem: Problem, surplus_j: float, fuel_j: float) -> Status:
+def _status(problem: Problem, surplus_j: float, fuel_j: float, *, electric: bool) -> Status:
     charge = None
-    if not is_neutral(surplus_j, fuel_j):
+    # What a car without an engine has left above what is asked is what it is driven for.
+    if not is_neutral(surplus_j, fuel_j) and not (electric and surplus_j > 0):
         missed = Mark.CHARGE_ABOVE if surplus_j > 0 else Mark.CHARGE_MISSED
         charge = Mark.NOT_NEUTRAL if problem.end_min_j == problem.start_j else missed
     return Status(charge, shortfall_steps(problem))

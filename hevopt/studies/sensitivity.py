@@ -106,7 +106,7 @@ def effects_on(
             f"{car.name} is not what {car.source} holds: sensitivities are of a car as its file has it; give its "
             "name or file, and the changes beside"
         )
-    names = list(strategies or _usual(car.functions))
+    names = list(strategies or _usual(car.marks))
     for name in names:
         strategy_named(name, others)
     check_horizon(settings.horizon_s, names, others)
@@ -151,8 +151,8 @@ def _required(car: str, row: Row | HevoptError) -> Row:
     return row
 
 
-def _usual(functions: frozenset[str]) -> list[str]:
-    fit = fitting(functions)
+def _usual(marks: frozenset[str]) -> list[str]:
+    fit = fitting(marks)
     return [name for name in ("dp",) if name in fit] + [n for n in _RULES if n in fit][:1]
 
 

@@ -115,7 +115,7 @@ def strategies_for(
         for name in wanted:
             strategy_named(name, others)
         return list(wanted)
-    names = fitting(car.functions, every=wanted is not None)
+    names = fitting(car.marks, every=wanted is not None)
     return [name for name in names if car.engine.nox_known or not _cuts_nox(strategy_named(name))]
 
 

@@ -19,6 +19,7 @@ class Parameter:
     keys: their key paths; the first one that a car has gives the value shown
     step: what is taken away and added; None: a share of 10 %; relative: the value shown is 1, as given
     whole: values are rounded to whole numbers
+    others: values tried beside the car's own, which may be 0 or left out, in place of less and more
     """
 
     name: str
@@ -27,6 +28,7 @@ class Parameter:
     step: float | None = None
     relative: bool = False
     whole: bool = False
+    others: tuple[float, ...] = ()
 
 
 PARAMETERS = (
@@ -58,6 +60,11 @@ PARAMETERS = (
     Parameter("machine inertia", "kg m²", ("machine.inertia_kgm2",)),
     Parameter("spin efficiency", "share", ("machine.spin_efficiency",), step=0.05),
     Parameter("fuel of a start", "g", ("engine.start_fuel_g",)),
+    Parameter("machine's share of braking", "mean share", ("car.braking.machine_share",)),
+    Parameter("gap at a change of gear", "s", ("gearbox.shift_gap_s",), others=(0.0, 1.0)),
+    Parameter(
+        "least time on and off", "s", ("engine.least_on_s", "engine.least_off_s"), others=(2.0, 4.0)
+    ),
 )
 
 
@@ -73,7 +80,7 @@ class Trial:
 def trials_of(contents: Mapping[str, Any]) -> list[Trial]:
     """A trial for every parameter that a car, given by its files' keys and values, has."""
     trials = [_trial(contents, parameter) for parameter in PARAMETERS]
-    nox = contents["engine"].get("nox_coefficients")
+    nox = contents.get("engine", {}).get("nox_coefficients")
     if nox is not None:
         steep = read_contents(find("architectures/components", _STEEP_NOX, ".toml"))
         trials.append(_nox_trial(nox, steep["nox_coefficients"]))
@@ -82,6 +89,8 @@ def trials_of(contents: Mapping[str, Any]) -> list[Trial]:
 
 def _trial(contents: Mapping[str, Any], parameter: Parameter) -> Trial | None:
     """None where the car lacks the figure, has it at 0, or cannot have another."""
+    if parameter.others:
+        return _others(contents, parameter)
     found = {key: value for key in parameter.keys if (value := _at(contents, key)) is not None}
     if not found:
         return None
@@ -99,6 +108,19 @@ def _trial(contents: Mapping[str, Any], parameter: Parameter) -> Trial | None:
         }
         points[value / first if parameter.relative else value] = {} if value == first else changes
     return Trial(parameter, list(points), list(points.values())) if len(points) > 1 else None
+
+
+def _others(contents: Mapping[str, Any], parameter: Parameter) -> Trial | None:
+    """The car's own value and some others; None where it lacks the component."""
+    component = parameter.keys[0].partition(".")[0]
+    if component not in contents:
+        return None
+    own = max(float(_at(contents, key) or 0.0) for key in parameter.keys)
+    changes: dict[float, Mapping[str, Any]] = {
+        value: dict.fromkeys(parameter.keys, value) for value in parameter.others
+    }
+    points = dict(sorted({**changes, own: {}}.items()))
+    return Trial(parameter, list(points), list(points.values()))
 
 
 def _nox_trial(own: Mapping[str, float], steep: Mapping[str, float]) -> Trial | None:

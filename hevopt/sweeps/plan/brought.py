@@ -21,7 +21,7 @@ def brought_of(
     folder: of the study, from where files are named; car: None where it has faults itself, so that any may fit
     others: names that are allowed too. No file of a strategy is run here.
     """
-    fit = [*(fitting(car.functions, every=True) if car else every_strategy()), *others]
+    fit = [*(fitting(car.marks, every=True) if car else every_strategy()), *others]
     found: dict[str, Brought] = {}
     files, faults = [], []
     for name in names:
