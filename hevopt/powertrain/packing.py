@@ -83,7 +83,8 @@ def _flat(parts: Sequence[Gridded], battery: Battery) -> _Flat:
 def _points(number: int, part: Gridded, battery: Battery) -> _Flat:
     here, done = part.here, part.done
     states = len(here.shafts.step)
-    shape = np.broadcast_shapes((states, 1), *(torque.shape for torque in part.given.values()))
+    torques = (torque.shape for torque in part.given.values())
+    shape = np.broadcast_shapes((states, 1), part.repeats.shape, *torques)
     where = np.flatnonzero(np.broadcast_to(~part.repeats, shape))
     state, level = np.divmod(where, shape[1])
     values = (done.fuel_kg, done.nox_kg, done.battery_w)
