@@ -104,7 +104,7 @@ def test_a_measured_map_is_copied_cell_by_cell(tmp_path):
     [
         ("a b", {}, "allowed: up to 60 letters, digits, - and _"),
         ("../x", {}, "allowed: up to 60 letters"),
-        ("c2", {}, "that of a shipped one (A, B, C1, C2, D, E, light_truck_p2, "),
+        ("c2", {}, "that of a shipped one (A, B, C1, C2, D, E, electric_compact, light_truck_p2, "),
         ("mine", {"like": "C3"}, "close matches: C2"),
         (
             "mine",
