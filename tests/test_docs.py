@@ -94,6 +94,9 @@ def test_numbers_of_the_theory_are_those_of_the_code():
     text = (ROOT / "docs" / "theory" / "dynamic_programming.md").read_text()
     numbers = {
         "ENERGY_NODES": f"{dp.ENERGY_NODES}",
+        "_QUICK": "; ".join(
+            ", ".join(f"{part:g}" for part in parts) for parts in zip(*dp._QUICK, strict=True)
+        ),
         "_BANDS": ", ".join(f"{band:g}" for band in dp._BANDS),
         "_GAIN_WORTH_MORE": f"{1e5 * dp._GAIN_WORTH_MORE:g}·10⁻⁵ of the cost",
         "_PROMISE_TOLERANCE": f"{100 * dp._PROMISE_TOLERANCE:g} %",

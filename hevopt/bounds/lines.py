@@ -68,6 +68,13 @@ def maximise(
     return sorted(lines, key=lambda line: line.value_kg)
 
 
+def crossing_of(one: Line, other: Line) -> float:
+    """The scale between two lines where they meet; that of the one where they meet nowhere there."""
+    left, right = sorted((one, other), key=lambda line: line.scale)
+    scale, _ = _crossing(_Touch.of(left), _Touch.of(right))
+    return scale if left.scale < scale < right.scale else one.scale
+
+
 @dataclass(frozen=True, slots=True)
 class _Touch:
     """A supporting line by where it touches and its value at scale 0."""

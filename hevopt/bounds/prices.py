@@ -176,18 +176,13 @@ def dual(problem: Problem, choices: Choices, priced: Priced) -> list[Line]:
     """
     paths = _Paths(problem, choices, priced)
     lines = maximise(paths.line, typical_price_kgpj(choices, priced.worth), paths.steepest)
-    fallen_kg = 2.0 * float(np.sum(step_maxima(choices, -choices.cost_kg)))
-    many = EPSILON * (2 * choices.steps + 48)
-    shape = np.append(priced.before[1:], priced.end_price)
+    return sorted(map(paths.lowered, lines), key=lambda line: line.value_kg)
 
-    def lowered(line: Line) -> Line:
-        own_kg = abs(line.value_kg - line.scale * priced.constant)
-        rounding_kg = many * (own_kg + fallen_kg) + line.scale * priced.rounding_kg
-        rounding_kg += TINY * (line.scale > 0)
-        value_kg = line.value_kg - rounding_kg
-        return replace(line, value_kg=value_kg, rounding_kg=rounding_kg, shape=shape)
 
-    return sorted(map(lowered, lines), key=lambda line: line.value_kg)
+def dual_at(problem: Problem, choices: Choices, priced: Priced, scale: float) -> Line:
+    """The supporting line of g at one scale S >= 0, its maximum or not; see `dual`."""
+    paths = _Paths(problem, choices, priced)
+    return paths.lowered(paths.line(scale))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,6 +200,17 @@ class _Paths:
         total, path = self._shortest(self.choices, value_kg, scale * priced.before)
         end_price = scale * priced.end_price
         return Line(scale, total + scale * priced.constant, self._slope(path), end_price)
+
+    def lowered(self, line: Line) -> Line:
+        """A line less what rounding can have done to its value, with the shape of its prices."""
+        priced, choices = self.priced, self.choices
+        fallen_kg = 2.0 * float(np.sum(step_maxima(choices, -choices.cost_kg)))
+        own_kg = abs(line.value_kg - line.scale * priced.constant)
+        rounding_kg = EPSILON * (2 * choices.steps + 48) * (own_kg + fallen_kg)
+        rounding_kg += line.scale * priced.rounding_kg + TINY * (line.scale > 0)
+        value_kg = line.value_kg - rounding_kg
+        shape = np.append(priced.before[1:], priced.end_price)
+        return replace(line, value_kg=value_kg, rounding_kg=rounding_kg, shape=shape)
 
     def steepest(self) -> tuple[float, float]:
         """Cost and slope of the path whose priced part is least: g's line at a scale without end."""

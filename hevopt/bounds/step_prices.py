@@ -34,7 +34,7 @@ import numpy as np
 
 from hevopt.bounds import _step_prices_kernels as kernels
 from hevopt.bounds._step_prices_kernels import WindowCells
-from hevopt.bounds.lines import Line
+from hevopt.bounds.lines import Line, crossing_of
 from hevopt.bounds.prices import (
     EPSILON,
     STEEPEST,
@@ -42,6 +42,7 @@ from hevopt.bounds.prices import (
     before_steps,
     bounded_choices,
     dual,
+    dual_at,
     priced_rounding,
 )
 from hevopt.errors import SolverError
@@ -55,16 +56,36 @@ from hevopt.problem.problem import Problem, Trajectory
 CELLS = 256
 # Longer drives are given to the linear program in parts: its time grows faster than their length.
 _LP_STEPS, _LP_OVERLAP = 4000, 1000
+# A price by costates lies about so close to that of one multiplier.
+_NEAR = 0.01
 # Share of the highest U² by which a curve may leave a straight line and still be taken for one.
 _STRAIGHT = 1e-7
 
 
 def costate_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
     """Lines of the dual whose prices follow the costate equation along a rollout, the highest last."""
+    return dual_of_shape(problem, rollout, _costate(problem, rollout))
+
+
+def costate_bound_kg(problem: Problem, rollout: Trajectory, end_price_kgpj: float) -> float:
+    """The best bound by costate prices along a rollout that three evaluations of g find near an end price.
+
+    At most that of the highest line of `costate_dual`, and close to it at the price of one multiplier.
+    """
+    choices, priced = _priced(problem, rollout, _costate(problem, rollout))
+    scale = end_price_kgpj / priced.end_price if priced.end_price > 0 else 0.0
+    at_price = dual_at(problem, choices, priced, scale)
+    uphill = scale * (1 + np.sign(at_price.slope_kg) * _NEAR)
+    beside = dual_at(problem, choices, priced, uphill)
+    between = dual_at(problem, choices, priced, crossing_of(at_price, beside))
+    return max(line.value_kg for line in (at_price, beside, between))
+
+
+def _costate(problem: Problem, rollout: Trajectory) -> Array:
+    """(time,) prices that follow the costate equation along a rollout."""
     inside = problem.battery.within_window()
-    power, step_s = rollout.battery_power_w, problem.table.step_s
-    return dual_of_shape(
-        problem, rollout, kernels.costate(_between_j(rollout), power, step_s, inside)
+    return kernels.costate(
+        _between_j(rollout), rollout.battery_power_w, problem.table.step_s, inside
     )
 
 
@@ -74,9 +95,15 @@ def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
 
 
 def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[Line]:
-    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0.
+    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0, up to its maximum."""
+    return dual(problem, *_priced(problem, rollout, price))
+
+
+def _priced(problem: Problem, rollout: Trajectory, price: Array) -> tuple[Choices, Priced]:
+    """The choices of g, and their priced part at scale 1 for (time,) prices p_1 ... p_T >= 0.
 
     The shape is taken at a size of about 1, by a power of two, which no product of prices and energies overflows.
+    Raises SolverError for prices that are not finite and >= 0.
     """
     if not (np.isfinite(price).all() and (price >= 0).all()):
         raise SolverError("the prices of stored energy are not all finite and >= 0")
@@ -95,8 +122,7 @@ def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[L
         worth = kernels.worth_by_cells(choices, price, start, cells, inside)
     constant = price[-1] * problem.end_min_j - price[0] * problem.start_j
     rounding = priced_rounding(problem, choices, price, tangents=line is not None)
-    priced = Priced(worth, before_steps(price), float(constant), float(price[-1]), rounding)
-    return dual(problem, choices, priced)
+    return choices, Priced(worth, before_steps(price), float(constant), float(price[-1]), rounding)
 
 
 def _between_j(rollout: Trajectory) -> Array:

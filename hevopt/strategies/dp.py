@@ -11,19 +11,23 @@ dominated choice superfluous. Where the rollout cannot keep what the value funct
 misled it, and steep prices with all choices follow; where they cannot keep theirs either, as in windows that hold
 few steps' energy, once more on finer grids.
 
-The first grid spans the SOC window; the next ones ever narrower bands around the path found.
+The first grid spans the SOC window; the next ones ever narrower bands around the path found. A quick look comes
+before where a gap that is enough is told: a coarse grid over the window and one band. Where a bound proves that
+its path keeps to that gap, as it does for most cars, there is no other grid.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from hevopt.bounds.prices import one_price_dual, typical_price_kgpj
-from hevopt.errors import DataError
+from hevopt.bounds.prices import TINY, one_price_dual, typical_price_kgpj
+from hevopt.bounds.step_prices import costate_bound_kg
+from hevopt.errors import DataError, SolverError
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, without_dominated
 from hevopt.problem.problem import Plan, Problem
-from hevopt.problem.simulation import total_cost_kg
+from hevopt.problem.simulation import simulate, total_cost_kg
 from hevopt.problem.switching import switched
 from hevopt.strategies._backward_kernels import Penalty, backward
 from hevopt.strategies._reach_kernels import Reach
@@ -35,6 +39,8 @@ ENERGY_NODES = 1001
 # Widths of the grids as shares of the SOC window; finer ones are tried while they gain this share of cost.
 _BANDS = (1.0, 0.1, 0.01, 0.003, 0.001)
 _GAIN_WORTH_MORE = 2e-5
+# The grids of a quick look, as shares of window and nodes.
+_QUICK = ((1.0, 0.25), (0.1, 1.0))
 # Missing charge costs this many times what it is worth.
 _GENTLE, _STEEP = 5.0, 1e4
 # A rollout dearer than promised by this share has been misled.
@@ -56,8 +62,17 @@ class _Setting:
     hard_top: bool
 
 
-def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -> Plan:
-    """The plan of least cost on grids of `nodes` stored energies; without `refine`, on the first grid only."""
+def solve(
+    problem: Problem,
+    *,
+    nodes: int = ENERGY_NODES,
+    refine: bool = True,
+    enough_gap: float = 0.0,
+) -> Plan:
+    """The plan of least cost on grids of `nodes` stored energies; without `refine`, on the first grid only.
+
+    enough_gap: a share of the cost; a plan of few grids that is proven to be within it of the optimum is taken
+    """
     if not 3 <= nodes <= _NODES_MAX:
         raise DataError(f"energy nodes {nodes}; allowed: 3 to {_NODES_MAX}")
     every = choices_of(problem)
@@ -67,28 +82,44 @@ def solve(problem: Problem, *, nodes: int = ENERGY_NODES, refine: bool = True) -
     gentle = _Setting(
         problem, every, without_dominated(every), reach, _GENTLE * worth, hard_top=False
     )
+    notes = {"price_kgpj": price, "nodes": nodes}
+    if enough_gap > 0:
+        grids = [(band, max(int(share * nodes), 3)) for band, share in _QUICK]
+        cost, control, _ = _search(gentle, grids)
+        if _proven_gap(problem, control, cost, price) <= enough_gap:
+            return Plan(control, notes)
     bands = _BANDS if refine else _BANDS[:1]
-    cost, control, promised = _search(gentle, bands, nodes)
+    cost, control, promised = _search(gentle, [(band, nodes) for band in bands])
     steep = _Setting(problem, every, every, reach, _STEEP * worth, hard_top=True)
     for finer in (nodes, min(_FINER * nodes, _NODES_MAX)):
         if cost - promised <= _PROMISE_TOLERANCE * abs(cost):
             break
-        steep_cost, steep_control, promised = _search(steep, bands, finer)
+        steep_cost, steep_control, promised = _search(steep, [(band, finer) for band in bands])
         if steep_cost < cost:
             cost, control = steep_cost, steep_control
-    return Plan(control, {"price_kgpj": price, "nodes": nodes})
+    return Plan(control, notes)
 
 
-def _search(
-    setting: _Setting, bands: tuple[float, ...], nodes: int
-) -> tuple[float, Indices, float]:
-    """Cost and controls of the best path over all grids, and what the first grid promised."""
+def _proven_gap(problem: Problem, control: Indices, cost_kg: float, price: float) -> float:
+    """The share of its cost by which costate prices along a plan prove it to be at most above the optimum."""
+    try:
+        bound_kg = costate_bound_kg(problem, simulate(problem, control), price)
+    except SolverError:
+        return np.inf
+    return (cost_kg - bound_kg) / max(abs(cost_kg), TINY)
+
+
+def _search(setting: _Setting, grids: Sequence[tuple[float, int]]) -> tuple[float, Indices, float]:
+    """Cost and controls of the best path over all grids, and what the first grid promised.
+
+    grids: width as a share of the SOC window, and number of nodes
+    """
     problem, choices = setting.problem, setting.every
     low, high = problem.window_j
     centre = np.full(choices.steps + 1, (low + high) / 2)
     switch_j = np.zeros(choices.steps)
     best_cost, best, promises = np.inf, np.empty(0, np.int64), list[float]()
-    for band in bands:
+    for band, nodes in grids:
         cell = band * (high - low) / (nodes - 1)
         grid = _grid_around(problem, centre, cell, nodes)
         between = _grid_around(problem, centre[:-1] - switch_j, cell, nodes).low_j

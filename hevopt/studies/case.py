@@ -105,7 +105,7 @@ def dp_case(
 ) -> Case:
     """A problem of a car on a cycle, solved by dynamic programming and certified along its rollout."""
     began = perf_counter()
-    plan = dp.solve(problem)
+    plan = dp.solve(problem, enough_gap=TARGET_GAP)
     trajectory = simulate(problem, plan.control)
     dp_s = perf_counter() - began
     certificate = certify(problem, trajectory, target_gap=target_gap)

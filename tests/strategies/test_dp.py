@@ -150,6 +150,21 @@ def test_fuel_converges_with_energy_nodes_and_torque_levels(problem_of):
     assert steps[1] < steps[0] and steps[1] / best < 2e-3
 
 
+@pytest.mark.parametrize("name", ["B", "C2", "D"])
+def test_a_quick_look_is_taken_only_where_it_is_proven_to_be_enough(problem_of, name, monkeypatch):
+    problem = problem_of(name, "hwfet")
+    whole, grids = simulate(problem, dp.solve(problem).control), []
+    search = dp._search
+    monkeypatch.setattr(dp, "_search", lambda *args: grids.append(len(args[1])) or search(*args))
+    for gap, searches in ((5e-4, [2]), (1e-12, [2, len(dp._BANDS)])):
+        grids.clear()
+        quick = simulate(problem, dp.solve(problem, enough_gap=gap).control)
+        assert grids == searches
+        bound_kg, _ = certify(problem, quick).bound_of(quick)
+        assert quick.cost_kg - bound_kg <= max(gap, 5e-4) * quick.cost_kg
+        assert quick.cost_kg <= whole.cost_kg * (1 + gap)
+
+
 def test_order_of_controls_does_not_matter():
     problem = random_problem(12)
     table = problem.table
