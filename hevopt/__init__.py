@@ -50,6 +50,7 @@ _HOME = {
     "performance": "hevopt.forward.performance",
     "Performance": "hevopt.forward.performance",
     "Handling": "hevopt.forward.run",
+    "Asking": "hevopt.forward.asked",
     "coastdown": "hevopt.measured.coastdown.coastdown",
     "HevoptError": "hevopt.errors",
     "DataError": "hevopt.errors",

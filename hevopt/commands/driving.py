@@ -15,10 +15,20 @@ def drive(
     given: dict[str, Any],
     architecture: ArchitectureArgument,
     strategy: Annotated[
-        str, typer.Option("--strategy", help="Name of a strategy, whose plan is driven.")
+        str, typer.Option("--strategy", help="Name of a strategy, which decides or is replayed.")
     ] = "dp",
     cycle: CycleOption = "nedc",
     step: Annotated[float, typer.Option("--step", help="Step, 0.001 to 0.1 s.")] = 0.01,
+    decide_every: Annotated[
+        float, typer.Option("--decide-every", help="From one decision to the next, 0.02 to 10 s.")
+    ] = 0.5,
+    dwell: Annotated[
+        float,
+        typer.Option("--dwell", help="The engine stays on, and off, for so many seconds, 0 to 60."),
+    ] = 1.0,
+    replay: Annotated[
+        bool, typer.Option("--replay", help="Drive the plan even where the strategy can decide.")
+    ] = False,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit status 3 where the trace is missed.")
     ] = False,
@@ -28,10 +38,14 @@ def drive(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """A strategy's plan driven forward, with driver, clutch and tyres, beside the backward run."""
+    """A strategy driven forward, with driver, clutch and tyres, beside the backward run.
+
+    conventional, nox_cut, a_ecms, sdp and mpc decide on the way; of all others the plan is replayed.
+    """
     from hevopt.commands.comparing import ComparisonJob
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
+    from hevopt.forward.asked import Asking
     from hevopt.output import driven_tables as tables
     from hevopt.output.file_tables import check_table_file, write_frame
     from hevopt.studies.cars import cars_of
@@ -46,7 +60,10 @@ def drive(
         check_table_file(out)
     with Progress() as progress:
         progress(f"{car.name}: {strategy}", 0, 1)
-        driven = driven_by(car, job.trace, strategy, settings=settings, step_s=step)
+        driven = driven_by(
+            car, job.trace, strategy, settings=settings, step_s=step,
+            asking=Asking(decide_every, dwell), replay=replay,
+        )  # fmt: skip
     if out is not None:
         write_frame(out, tables.steps_frame(driven.run), job.about)
     if json:

@@ -37,7 +37,7 @@ def resting_lever(way: int) -> Lever:
     return Lever(way, way, 0.0, 0.0, _NEVER_S, -1)
 
 
-@compiled()
+@compiled(inline="always")
 def moves_machine(ways: Ways, lever: Lever) -> bool:
     """Whether the machine's gear is part of the change under way."""
     differs = ways.wheel[lever.way, 1] != ways.wheel[lever.from_way, 1]
@@ -107,7 +107,7 @@ def _followed(
     return Lever(lever.way, lever.from_way, blend, lever.gap_s, lever.since_s, lever.back)
 
 
-@compiled()
+@compiled(inline="always")
 def keeping_pace_nm(
     ways: Ways, state: State, lever: Lever, wheel_radps: float, step_s: float
 ) -> float:

@@ -66,7 +66,7 @@ def smooth_at(values: Array, step: float, x: float) -> float:
     )
 
 
-@compiled()
+@compiled(inline="always")
 def share_of_braking(speed_mps: float, rate: float, limits: Limits) -> float:
     """Share of the wheels' braking that may pass the machine's axle."""
     table = limits.braking_share
@@ -81,7 +81,7 @@ def share_of_braking(speed_mps: float, rate: float, limits: Limits) -> float:
     return float(low + x * (high - low))
 
 
-@compiled()
+@compiled(inline="always")
 def electric_w(torque: float, speed: float, limits: Limits) -> float:
     """Electric power of the machine, by its tabulated loss."""
     rows, columns = limits.loss_w.shape

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._compile import compiled
+from hevopt.forward._acting_kernels import LoopCar
 from hevopt.forward._contact_kernels import clutch_capacity_nm, pace_of, resistance
-from hevopt.forward._drive_kernels import LoopCar
 from hevopt.forward._lever_kernels import changed, keeping_pace_nm, moves_machine, resting_lever
 from hevopt.forward._limits_kernels import at, electric_w
 from hevopt.forward._plant_kernels import step

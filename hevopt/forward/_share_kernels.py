@@ -149,20 +149,20 @@ def shared(
     return Shared(engine, machine, clutch, brake, full)
 
 
-@compiled()
+@compiled(inline="always")
 def machine_range(speed: float, limits: Limits) -> tuple[float, float]:
     """Lowest and highest torque of the machine at a speed, beyond its own axis none."""
     low = at(limits.low_nm, limits.machine_step, abs(speed))
     return low, at(limits.high_nm, limits.machine_step, abs(speed))
 
 
-@compiled()
+@compiled(inline="always")
 def following_nm(side_radps: float, limits: Limits) -> float:
     """Torque of an alternator that follows the electric load."""
     return smooth_at(limits.load_nm, limits.engine_step, side_radps)
 
 
-@compiled()
+@compiled(inline="always")
 def pace_nm(speed: float, limits: Limits) -> float:
     """Torque of either sign by which a machine brings its rotor along; a little where it may give none."""
     low, high = machine_range(speed, limits)

@@ -10,7 +10,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.forward import _pull_kernels as col
-from hevopt.forward._drive_kernels import LoopCar
+from hevopt.forward._acting_kernels import LoopCar
 from hevopt.forward._pull_kernels import Foot
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.run import Handling, loop_car, shifting_of
@@ -99,7 +99,7 @@ def performance(
     heavy = replace(car.vehicle, mass_kg=car.vehicle.mass_kg + added_kg)
     car, line = replace(car, vehicle=heavy), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
-    driven = loop_car(car, line, handling, shifting)
+    driven = loop_car(car, line, handling._replace(shifting=shifting))
     foot = Foot(
         LAUNCH_RPM / RPM_PER_RADPS,
         UP_RPM / RPM_PER_RADPS,

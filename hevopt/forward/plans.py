@@ -1,15 +1,19 @@
-"""What a driver is to do with engine and gears: a plan made backward, replayed."""
+"""What a driver is to do with engine and gears: a plan made backward, replayed, or what a strategy decides."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from hevopt.car.driveline import State
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.forward.lines import Line
 from hevopt.powertrain.flows import PowerFlows
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.dwell import RepeatedFlows
 from hevopt.problem.problem import Trajectory
+from hevopt.problem.table import ControlTable, Signals
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -31,24 +35,48 @@ class ForwardPlan(Shown):
 def replay_of(trajectory: Trajectory, line: Line) -> ForwardPlan:
     """The plan that a trajectory of a table from `build_problem` has driven."""
     table = trajectory.problem.table
-    flows, signals = table.flows, table.signals
-    if not isinstance(flows, PowerFlows) or signals is None:
-        raise DataError("only a plan on a table that build_problem has made can be driven forward")
-    states = flows.states(trajectory.control)
-    listed = np.array([state.listed for state in states])
-    gear = np.where(listed > 0, listed, signals.gear)
-    moving = signals.speed_mps > 0
-    neutral = (gear == 0) & moving
-    in_gear = _held(np.where(moving & (gear > 0), gear, 0))
+    flows, columns = flows_of(table)
+    signals = signals_of(table)
+    states = flows.states(columns[trajectory.control])
+    in_gear, open_while = driver_gears(signals, states)
     way = [line.index(int(g), state.gears) for g, state in zip(in_gear, states, strict=True)]
     machine = trajectory.flows[f"{flows.machines[0]}_torque_nm"]
     return ForwardPlan(
         np.array(way, dtype=np.int64),
         np.array([state.engine_on for state in states]),
-        np.where(neutral, 2, np.where(signals.clutch_open, 1, 0)).astype(np.int64),
+        open_while,
         np.ascontiguousarray(machine, dtype=np.float64),
         np.ascontiguousarray(trajectory.energy_j, dtype=np.float64),
     )
+
+
+def flows_of(table: ControlTable) -> tuple[PowerFlows, Indices]:
+    """The flows of a table's controls before a dwell repeats them, and which of those each control is."""
+    found: Mapping[str, Array] = table.flows
+    flows, columns = found, np.arange(len(table.mode))
+    if isinstance(found, RepeatedFlows):
+        flows, columns = found.flows, found.columns
+    if not isinstance(flows, PowerFlows):
+        raise DataError("only a plan on a table that build_problem has made can be driven forward")
+    return flows, columns
+
+
+def signals_of(table: ControlTable) -> Signals:
+    """The signals of a table that has them."""
+    if table.signals is None:
+        raise DataError("only a plan on a table that build_problem has made can be driven forward")
+    return table.signals
+
+
+def driver_gears(signals: Signals, states: Sequence[State] = ()) -> tuple[Indices, Indices]:
+    """(time,) gear that the driver has in, and `open_while` of the clutch; states: that chose gears."""
+    listed = np.array([state.listed for state in states]) if states else np.zeros_like(signals.gear)
+    gear = np.where(listed > 0, listed, signals.gear)
+    moving = signals.speed_mps > 0
+    neutral = (gear == 0) & moving
+    in_gear = _held(np.where(moving & (gear > 0), gear, 0))
+    open_while = np.where(neutral, 2, np.where(signals.clutch_open, 1, 0)).astype(np.int64)
+    return in_gear, open_while
 
 
 def _held(gear: Indices) -> Indices:

@@ -13,6 +13,7 @@ from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
+from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._contact_kernels import Body
 from hevopt.forward._pedal_kernels import DriverGains
 from hevopt.forward.books import Books, books_of
@@ -137,22 +138,29 @@ def follow(
     A trace that cannot be followed is driven on; the run's `quality` says where it was left. DataError for a step
     or a figure out of range, a driveline that cannot be driven forward, and a battery that empties on the way.
     """
+    line, handling = line or line_of(car), whole_handling(car, handling)
+    exact_s, record = steps_of(cycle, step_s, handling)
+    driven, task = loop_car(car, line, handling), task_of(cycle, plan, cycle.time_s)
+    col.drive(driven, task, float(plan.energy_j[0]), exact_s, record)
+    return run_of(car, cycle, task, plan.energy_j, line, handling, record, exact_s)
+
+
+def whole_handling(car: Architecture, handling: Handling | None) -> Handling:
+    """Handling with how this car changes gear."""
     handling = handling or Handling()
+    return handling._replace(shifting=handling.shifting or shifting_of(car))
+
+
+def steps_of(cycle: Cycle, step_s: float, handling: Handling) -> tuple[float, Array]:
+    """Length of the steps, so that they fill the cycle, and the empty record; DataError as `follow` says."""
     _check(cycle, step_s, handling)
-    line = line or line_of(car)
-    shifting = handling.shifting or shifting_of(car)
     count = int(np.ceil(cycle.duration_s / step_s - 1e-9))
-    exact_s = cycle.duration_s / count
-    record = np.zeros((count, col.COLUMNS))
-    driven = loop_car(car, line, handling, shifting)
-    start_j = float(plan.energy_j[0])
-    col.drive(driven, task_of(cycle, plan), start_j, exact_s, record)
-    return _run_of(car, cycle, plan, line, Handling(handling.tyre, handling.clutch, shifting,
-                   handling.driver), record, exact_s)  # fmt: skip
+    return cycle.duration_s / count, np.zeros((count, col.COLUMNS))
 
 
-def loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifting) -> col.LoopCar:
-    """A car as the compiled loops read it."""
+def loop_car(car: Architecture, line: Line, handling: Handling) -> LoopCar:
+    """A car as the compiled loops read it; handling: that of `whole_handling`."""
+    shifting = handling.shifting or shifting_of(car)
     vehicle, pack = car.vehicle, car.battery
     body = Body(
         float(vehicle.mass_kg), float(vehicle.equivalent_mass_kg), float(vehicle.tyre_radius_m),
@@ -160,7 +168,7 @@ def loop_car(car: Architecture, line: Line, handling: Handling, shifting: Shifti
         _floats(handling.clutch),
     )  # fmt: skip
     low, high = (float(energy_j(pack, end)) for end in (pack.soc_min, pack.soc_max))
-    return col.LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car), pack.arrays,
+    return LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car), pack.arrays,
                    (low, high), _floats(shifting), _floats(handling.driver))  # fmt: skip
 
 
@@ -174,26 +182,27 @@ def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
     return a, b, c, d
 
 
-def task_of(cycle: Cycle, plan: ForwardPlan) -> col.LoopTask:
-    """A trace and its plan as the compiled loop reads them."""
+def task_of(cycle: Cycle, plan: ForwardPlan, from_s: Array) -> LoopTask:
+    """A trace and its plan as the compiled loop reads them; from_s: (step + 1,) times of the plan's steps."""
 
     def own(values: Array) -> Array:
         return np.array(values, dtype=np.float64)
 
-    return col.LoopTask(
-        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), plan.way,
+    return LoopTask(
+        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), own(from_s), plan.way,
         plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j,
     )  # fmt: skip
 
 
-def _run_of(
-    car: Architecture, cycle: Cycle, plan: ForwardPlan, line: Line, handling: Handling,
+def run_of(
+    car: Architecture, cycle: Cycle, task: LoopTask, planned_j: Array, line: Line, handling: Handling,
     record: Array, step_s: float,
 ) -> ForwardRun:  # fmt: skip
-    start_mps, on = float(cycle.speed_mps[0]), bool(plan.engine_on[0])
-    turns = line.ways.wheel[plan.way[0], -1] * start_mps / car.vehicle.tyre_radius_m
+    """What a loop has recorded, judged; planned_j: (time + 1,) stored energy that was planned over the cycle."""
+    start_mps, on = float(cycle.speed_mps[0]), bool(task.engine_on[0])
+    turns = line.ways.wheel[task.way[0], -1] * start_mps / car.vehicle.tyre_radius_m
     side = max(car.engine.idle_radps, turns) if on else 0.0
-    books = books_of(car, line, record, (start_mps, side, float(plan.energy_j[0])), step_s)
+    books = books_of(car, line, record, (start_mps, side, float(planned_j[0])), step_s)
     time_s = cycle.time_s[0] + step_s * np.arange(len(record) + 1)
     _check_charge(car, books, time_s)
     speed = np.append(start_mps, record[:, col.SPEED])
@@ -204,7 +213,7 @@ def _run_of(
     return ForwardRun(
         car, cycle, step_s, handling, time_s, speed, wanted,
         line.gears[record[:, col.WAY].astype(np.int64)], phase, record[:, col.FULL] > 0, books,
-        soc(car.battery, books.energy_j), np.interp(time_s, cycle.time_s, plan.energy_j),
+        soc(car.battery, books.energy_j), np.interp(time_s, cycle.time_s, planned_j),
         drive_quality(car.vehicle, time_s, speed, wanted), starts,
         starts * car.engine.start_fuel_kg,
     )  # fmt: skip

@@ -97,13 +97,14 @@ def notes(driven: DrivenPlan) -> str:
     """Drive quality, where the trace was left, and what the difference is made of."""
     run, q = driven.run, driven.run.quality
     lines = [
+        how_text(driven),
         f"drive quality (SAE J2951): RMSSE {q.speed_error_mps * KMH_PER_MPS:.3f} km/h, "
         f"ER {q.energy_percent:+.2f} %, DR {q.distance_percent:+.3f} %, EER {q.energy_economy_percent:+.2f} %, "
         f"ASCR {q.speed_change_percent:+.2f} %, IWR {q.inertial_work_percent:+.2f} %",
         trace_text(run),
         f"at full load {run.full.sum() * run.step_s:.1f} s; "
         f"distance {run.distance_m - run.cycle.distance_m:+.2f} m; "
-        f"charge at the end {driven.charge_error:+.4f} against the plan's",
+        f"charge at the end {driven.charge_error:+.4f} against the backward run's",
         f"forward against backward, charge-corrected: {driven.change_percent:+.2f} %; by kind of step: "
         + ", ".join(f"{kind} {value:+.2f} %" for kind, value in driven.difference_percent.items()),
         "bound: of the backward problem, a car that follows the trace to the point and makes up for each gap of a "
@@ -112,6 +113,17 @@ def notes(driven: DrivenPlan) -> str:
         + ", ".join(f"{name} {value:.0e}" for name, value in run.residual.items()),
     ]
     return "\n".join(lines)
+
+
+def how_text(driven: DrivenPlan) -> str:
+    """Whether the strategy decided on the way, and how often."""
+    if driven.asked is None:
+        return f"{driven.strategy}: its plan for the cycle was replayed"
+    every, dwell = driven.asked
+    return (
+        f"{driven.strategy}: decided on the way, every {every:g} s, from what was stored and asked for then; "
+        f"the engine stayed on, and off, for {dwell:g} s at least"
+    )
 
 
 def trace_text(run: ForwardRun) -> str:
@@ -135,6 +147,7 @@ def as_dict(driven: DrivenPlan) -> dict[str, Any]:
         "car": run.car.name,
         "strategy": driven.strategy,
         "cycle": run.cycle.name,
+        "asked": None if driven.asked is None else driven.asked._asdict(),
         "step_s": run.step_s,
         "fuel_l_per_100km": driven.fuel_l_per_100km,
         "corrected_l_per_100km": driven.corrected_l_per_100km,

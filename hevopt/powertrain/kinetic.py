@@ -112,6 +112,12 @@ class Jumps:
             runs,
         )
 
+    def within(self, before: Kinetic, after: Kinetic, *, runs: bool) -> Taken:
+        """(time,) what each step would take that goes from one state to the other at its own mean speeds."""
+        one, other = before.engine_j.mean(axis=0), after.engine_j.mean(axis=0)
+        own = before.machines_j.mean(axis=1), after.machines_j.mean(axis=1)
+        return self.between(one, other, *own, runs)
+
     def between(
         self,
         engine_from: Array,

@@ -20,9 +20,9 @@ class Modes(NamedTuple):
     switch_energy_j: Array
 
 
-def modes_of(car: Architecture, branches: Sequence[Driven]) -> Modes:
+def modes_of(car: Architecture, branches: Sequence[Driven], *, apart: bool = False) -> Modes:
     """The modes of the branches. States are one mode where engine, gears that cost something to change and shafts'
-    kinetic energy are the same."""
+    kinetic energy are the same; apart: no step follows another, each switches at its own mean speeds."""
     keys = [(branch.state.engine_on, *_costly_gears(car, branch.state)) for branch in branches]
     firsts: list[int] = []
     mode = []
@@ -35,7 +35,7 @@ def modes_of(car: Architecture, branches: Sequence[Driven]) -> Modes:
         if found == len(firsts):
             firsts.append(n)
         mode.append(found)
-    fuel_kg, energy_j = _switching(car, [branches[first] for first in firsts])
+    fuel_kg, energy_j = _switching(car, [branches[first] for first in firsts], apart=apart)
     return Modes(np.array(mode), _short(fuel_kg), _short(energy_j))
 
 
@@ -47,7 +47,7 @@ def _costly_gears(car: Architecture, state: State) -> tuple[object, object]:
     return gears, state.listed if listed_kg else 0
 
 
-def _switching(car: Architecture, modes: Sequence[Driven]) -> tuple[Array, Array]:
+def _switching(car: Architecture, modes: Sequence[Driven], *, apart: bool) -> tuple[Array, Array]:
     """Fuel and stored energy of going from one mode to another, (time, mode, mode) each."""
     jumps, first = Jumps(car), modes[0].kinetic
     shape = first.engine_j.shape[-1], len(modes), len(modes)
@@ -55,7 +55,10 @@ def _switching(car: Architecture, modes: Sequence[Driven]) -> tuple[Array, Array
     for i, before in enumerate(modes):
         for j, after in enumerate(modes):
             runs = before.state.engine_on and after.state.engine_on
-            taken = jumps.taken(before.kinetic, after.kinetic, first, runs=runs)
+            if apart:
+                taken = jumps.within(before.kinetic, after.kinetic, runs=runs)
+            else:
+                taken = jumps.taken(before.kinetic, after.kinetic, first, runs=runs)
             fuel_kg[:, i, j] = taken.fuel_kg + _fuel_kg(car, before.state, after.state)
             energy_j[:, i, j] = taken.energy_j
     return fuel_kg, energy_j

@@ -71,8 +71,9 @@ def build_table(
     levels: int = TORQUE_LEVELS,
     allow_shortfall: bool = False,
     around: Around | None = None,
+    apart: bool = False,
 ) -> ControlTable:
-    """Every control at every step, (time, control)."""
+    """Every control at every step, (time, control); apart: no step follows another, see `points_of`."""
     if not 2 <= levels <= 2001:
         raise DataError(f"torque levels {levels}; allowed: 2 to 2001")
     found = branches(architecture, demand, levels, around)
@@ -96,7 +97,7 @@ def build_table(
             raise InfeasibleError(
                 shortfall_message(architecture, demand, stuck, missing, _rejects(found))
             )
-    return _assemble(architecture, demand, found, missing)
+    return _assemble(architecture, demand, found, missing, apart=apart)
 
 
 def around_plan(trajectory: Trajectory, table: ControlTable, share: float) -> Around:
@@ -144,9 +145,9 @@ def _stuck(found: list[Branch]) -> Flags:
 
 
 def _assemble(
-    architecture: Architecture, demand: Demand, found: list[Branch], missing: Array
+    architecture: Architecture, demand: Demand, found: list[Branch], missing: Array, *, apart: bool
 ) -> ControlTable:
-    modes = modes_of(architecture, [branch.driven for branch in found])
+    modes = modes_of(architecture, [branch.driven for branch in found], apart=apart)
     controls = tuple(
         Control(
             branch.driven.state.engine_on,

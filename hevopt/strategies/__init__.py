@@ -39,6 +39,8 @@ class Strategy(NamedTuple):
     usual: part of a comparison that names no strategies
     previews: takes horizon_s; learns: takes training, problems of the same car on other cycles
     start: makes a stepper of a problem, with the settings that solve takes; None where it plans all at once
+    start_on: makes one of a problem, and of operating points of the car that are asked for in any order, every so
+    many seconds; None where it has to know the step
     place: where a strategy of the user's stands, None for the shipped ones and where no other process finds it
     """
 
@@ -51,6 +53,7 @@ class Strategy(NamedTuple):
     previews: bool = False
     learns: bool = False
     start: Callable[..., Stepper] | None = None
+    start_on: Callable[..., Stepper] | None = None
     place: Located | None = None
 
 
@@ -67,10 +70,20 @@ STRATEGIES: dict[str, Strategy] = {
     ),
     "start_stop": Strategy(start_stop.solve, _RULE, _STOP, _HYBRID, start=start_stop.start),
     "conventional": Strategy(
-        conventional.solve, _RULE, _HYBRID, _ELECTRIC, start=conventional.start
+        conventional.solve,
+        _RULE,
+        _HYBRID,
+        _ELECTRIC,
+        start=conventional.start,
+        start_on=conventional.start_on,
     ),
     "nox_cut": Strategy(
-        nox_cut.solve, _RULE, _HYBRID | {"nox_cut"}, _ELECTRIC, start=nox_cut.start
+        nox_cut.solve,
+        _RULE,
+        _HYBRID | {"nox_cut"},
+        _ELECTRIC,
+        start=nox_cut.start,
+        start_on=nox_cut.start_on,
     ),
     "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
     "dp": Strategy(dp.solve, "whole cycle", _STOP),
@@ -93,6 +106,7 @@ STRATEGIES: dict[str, Strategy] = {
         causal=True,
         usual=False,
         start=a_ecms.start,
+        start_on=a_ecms.start_on,
     ),
     "sdp": Strategy(
         sdp.solve,
@@ -103,6 +117,7 @@ STRATEGIES: dict[str, Strategy] = {
         usual=False,
         learns=True,
         start=sdp.start,
+        start_on=sdp.start_on,
     ),
 }
 

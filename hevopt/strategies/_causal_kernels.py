@@ -28,10 +28,12 @@ class View(NamedTuple):
     """What the adaptive factor looks at.
 
     drain_j: (entry,) fall of stored energy at the start's state of charge, read for past steps only
+    interval_s: (time,) from a step's decision to the next
     speed_mps, braking: (time,) of the wheels
     """
 
     drain_j: Array
+    interval_s: Array
     speed_mps: Array
     braking: Flags
 
@@ -59,7 +61,8 @@ class Memory(NamedTuple):
 
     recovered_j, slowed_v2: energy stored while braking, and fall of the square of speed
     base_kgpj, since_s: the factor's base, and the time since it moved; integral: of the missing charge
-    oldest, span_s: first step of the past window, and its length; energy_j: stored before the last step
+    oldest, span_s: first step of the past window, and its length
+    row, energy_j: the last step, -1 before the first, and what was stored before it
     """
 
     recovered_j: float
@@ -69,6 +72,7 @@ class Memory(NamedTuple):
     since_s: float
     oldest: int
     span_s: float
+    row: int
     energy_j: float
 
 
@@ -203,17 +207,17 @@ def adaptive(
 ) -> tuple[int, float, Memory]:
     """Entry of step k, the factor that it is taken under, and what is remembered from then on.
 
-    memory: that of the step before
+    memory: that of the step before, k - 1 where a window of past steps is looked at, else whichever it was
     """
-    drain, speed, braking = view
+    drain, step_s, speed, braking = view
     low, high = window
-    step_s, energy = choices.step_s, state.energy_j
-    recovered, slowed, base, integral, since, oldest, span_s, before = memory
-    if k > 0:
-        recovered = regained(recovered, braking[k - 1], before, energy)
-        slowed += max(speed[k - 1] ** 2 - speed[k] ** 2, 0.0)
-        since += step_s[k - 1]
-        span_s += step_s[k - 1]
+    energy = state.energy_j
+    recovered, slowed, base, integral, since, oldest, span_s, row, before = memory
+    if row >= 0:
+        recovered = regained(recovered, braking[row], before, energy)
+        slowed += max(speed[row] ** 2 - speed[k] ** 2, 0.0)
+        since += step_s[row]
+        span_s += step_s[row]
     while oldest < k and span_s > p.window_s:
         span_s -= step_s[oldest]
         oldest += 1
@@ -235,4 +239,5 @@ def adaptive(
         paid_kg = choices.switching.kg[case, state.mode, n]
         value[n] -= later * (paid_kg + factor * choices.switching.energy_j[case, state.mode, n])
     entry, _ = decide(choices, k, state, value, SteadyGrid(low, high - low), battery)
-    return entry, factor, Memory(recovered, slowed, base, integral, since, oldest, span_s, energy)
+    seen = Memory(recovered, slowed, base, integral, since, oldest, span_s, k, energy)
+    return entry, factor, seen

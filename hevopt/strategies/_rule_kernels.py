@@ -141,8 +141,9 @@ def neutral_drive(
     start: State,
     end_j: float,
     battery: BatteryArrays,
-) -> tuple[RuleDrive, Indices]:
-    """The drive whose charging power ends with end_j or just more, and the engine's entries in it, (time,).
+) -> tuple[RuleDrive, Indices, tuple[int, int]]:
+    """The drive whose charging power ends with end_j or just more, the engine's entries in it, (time,), and of
+    which level they are before which step; from there on of the one below.
 
     engine: (level, time) entries by rising charging power. The lowest level that reaches the charge is kept up to
     the first step that will do, the one below it from there on; where none reaches it, the highest is kept.
@@ -151,9 +152,9 @@ def neutral_drive(
     steps, top = len(choices.step_s), len(engine) - 1
     driven = _at_rest(steps, start)
     if _drive(rule, engine[0], 0, choices, battery, driven) - end_j >= 0.0:
-        return driven, engine[0]
+        return driven, engine[0], (0, steps)
     if _drive(rule, engine[top], 0, choices, battery, driven) - end_j < 0.0:
-        return driven, engine[top]
+        return driven, engine[top], (top, steps)
     below, level = 0, top
     while level - below > 1:
         middle = (below + level) // 2
@@ -172,4 +173,5 @@ def neutral_drive(
         else:
             short = middle
     _drive(rule, engine[level - 1], until, choices, battery, driven)
-    return driven, np.concatenate((engine[level, :until], engine[level - 1, until:]))
+    taken = np.concatenate((engine[level, :until], engine[level - 1, until:]))
+    return driven, taken, (level, until)

@@ -58,10 +58,13 @@ class Outcome(Shown):
     """One member of a rule family: its controls, cost, NOx and end charge.
 
     rule, engine: what it takes, and the engine's entries (time,); control: (time,) controls that were taken
+    threshold_w, level: highest power driven electrically; charging power, and before which step it is that one
     """
 
+    threshold_w: float
     rule: kernels.Rule
     engine: Indices
+    level: tuple[int, int]
     control: Indices
     cost_kg: float
     nox_kg: float
@@ -71,21 +74,29 @@ class Outcome(Shown):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Calibrated(Shown):
-    """A stepper of the member that a calibration chose, and its plan, which tells of all members."""
+    """A stepper of the member that a calibration chose, and its plan, which tells of all members.
 
-    choices: Choices
+    rules: those of the problem that it was calibrated on; settings: of the member
+    """
+
+    rules: Rules
+    settings: Mapping[str, Any]
     outcome: Outcome
     plan: Plan
 
     def decide(self, k: int, energy_j: float, mode: int) -> int:
         """Index of the control that the rule takes at step k."""
         rule, engine = self.outcome.rule, self.outcome.engine
-        entry = kernels.entry_at(rule, engine, k, energy_j, mode, self.choices)
-        return int(self.choices.control[entry])
+        choices = self.rules.choices
+        entry = kernels.entry_at(rule, engine, k, energy_j, mode, choices)
+        return int(choices.control[entry])
 
 
-def rules_of(problem: Problem) -> Rules:
-    """The rules' entries on a problem; DataError where it has no signals to base rules on."""
+def rules_of(problem: Problem, like: Rules | None = None) -> Rules:
+    """The rules' entries on a problem; DataError where it has no signals to base rules on.
+
+    like: rules whose charging powers, and worth of charge, these take over
+    """
     table = problem.table
     if table.signals is None:
         raise DataError("rule-based strategies need a table with signals (speed, power, gear)")
@@ -110,8 +121,8 @@ def rules_of(problem: Problem) -> Rules:
         power_w=signals.wheel_power_w,
         # Standing or driving, the engine rule never picks a control without fuel.
         fired=on & (fuel > 0),
-        charge_w=np.linspace(0.0, charge_max, _CHARGE_LEVELS),
-        price_kgpj=one_price_dual(problem)[-1].price_kgpj,
+        charge_w=np.linspace(0.0, charge_max, _CHARGE_LEVELS) if like is None else like.charge_w,
+        price_kgpj=(one_price_dual(problem)[-1].price_kgpj if like is None else like.price_kgpj),
     )
 
 
@@ -120,24 +131,28 @@ def neutral_outcome(rules: Rules, threshold_w: float, engine: Indices) -> Outcom
 
     engine: (level, time) entries by charging power, of `engine_entries`
     """
-    choices, problem = rules.choices, rules.problem
+    choices, problem, rule = rules.choices, rules.problem, rule_of(rules, threshold_w)
+    driven, burning, level = kernels.neutral_drive(
+        rule, engine, choices, State(problem.start_mode, problem.start_j), problem.end_min_j,
+        problem.battery.arrays,
+    )  # fmt: skip
+    return _outcome(rules, threshold_w, rule, driven, burning, level)
+
+
+def rule_of(rules: Rules, threshold_w: float) -> kernels.Rule:
+    """The family's rule for an electric threshold."""
     driving = ~rules.standing & ~rules.braking
     electric = driving & (rules.power_w <= threshold_w) & (rules.electric >= 0)
     launch_on_engine = rules.engaging & ~_next_true(electric, rules.standing)
     stopped = rules.standing & ~launch_on_engine & (rules.off >= 0)
-    low, high = problem.window_j
-    rule = kernels.Rule(
+    low, high = rules.problem.window_j
+    return kernels.Rule(
         electric=np.where(electric, rules.electric, -1),
         fixed=np.where(stopped, rules.off, np.where(rules.braking, rules.recover, -1)),
-        modes=problem.table.mode[choices.control],
+        modes=rules.problem.table.mode[rules.choices.control],
         least_j=low + _SOC_LEVEL_SHARE * (high - low),
         price_kgpj=rules.price_kgpj,
     )
-    driven, burning = kernels.neutral_drive(
-        rule, engine, choices, State(problem.start_mode, problem.start_j), problem.end_min_j,
-        problem.battery.arrays,
-    )  # fmt: skip
-    return _outcome(rules, rule, driven, burning)
 
 
 def is_eligible(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
@@ -174,9 +189,9 @@ def calibrated(
         )
     eligible = [n for n in inside if calibration[n]["eligible"]] or inside
     chosen = min(eligible, key=lambda n: figure(calibration[n]))
-    outcome = members[chosen][1]
+    told, outcome = members[chosen]
     notes = {"calibration": calibration, "chosen": chosen}
-    return Calibrated(rules.choices, outcome, Plan(outcome.control, notes))
+    return Calibrated(rules, told, outcome, Plan(outcome.control, notes))
 
 
 def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
@@ -193,7 +208,12 @@ def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
 
 
 def _outcome(
-    rules: Rules, rule: kernels.Rule, driven: kernels.RuleDrive, engine: Indices
+    rules: Rules,
+    threshold_w: float,
+    rule: kernels.Rule,
+    driven: kernels.RuleDrive,
+    engine: Indices,
+    level: tuple[int, int],
 ) -> Outcome:
     """What a drive under a rule with the engine's entries, (time,), comes to."""
     problem, choices = rules.problem, rules.choices
@@ -203,8 +223,10 @@ def _outcome(
     stored = np.concatenate([energy_j, energy_j[:-1] - switch.energy_j])
     least_j, greatest_j = problem.battery.granted_window_j
     return Outcome(
+        threshold_w,
         rule,
         engine,
+        level,
         control,
         total_cost_kg(problem, control)[0],
         float(np.sum(problem.table.nox_kg[steps, control])),

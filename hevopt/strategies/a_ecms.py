@@ -37,6 +37,7 @@ from hevopt.bounds.prices import drain_at_j
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.choices import State, choices_of, require_choices, require_entry
+from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies.stepper import driven
@@ -61,7 +62,9 @@ _WINDOW_MIN_S = 10.0
 class AdaptiveFactor:
     """The adaptive factor on its way: what it remembers, and the factors so far, (time,), 0 ahead of it."""
 
-    def __init__(self, problem: Problem, settings: kernels.Feedback) -> None:
+    def __init__(
+        self, problem: Problem, settings: kernels.Feedback, interval_s: float | None = None
+    ) -> None:
         choices = choices_of(problem)
         require_choices(problem, choices, "a_ecms")
         drain_j = drain_at_j(problem, choices, problem.start_j)
@@ -69,13 +72,16 @@ class AdaptiveFactor:
             base_kgpj=settings.base_kgpj / problem.battery.coulombic_efficiency
         )
         self.problem, self.settings, self.choices = problem, settings, choices
-        self.view = kernels.View(drain_j, *_speed_and_braking(problem))
+        length_s = problem.table.step_s
+        if interval_s is not None:
+            length_s = frozen("interval_s", np.full(len(length_s), interval_s))
+        self.view = kernels.View(drain_j, length_s, *_speed_and_braking(problem))
         self.battery = problem.battery.arrays
         self.factor_kgpj = np.zeros(choices.steps)
         weight_v2 = settings.recovered_weight_v2
         self.memory = kernels.Memory(
             settings.recovered_jpv2 * weight_v2, weight_v2, settings.base_kgpj, 0.0, 0.0, 0, 0.0,
-            problem.start_j,
+            -1, problem.start_j,
         )  # fmt: skip
 
     def decide(self, k: int, energy_j: float, mode: int) -> int:
@@ -103,6 +109,11 @@ def start(
     return AdaptiveFactor(
         problem, feedback._replace(window_s=np.inf if window_s is None else float(window_s))
     )
+
+
+def start_on(problem: Problem, points: Problem, interval_s: float) -> AdaptiveFactor:
+    """The strategy on operating points, asked for any of them as often as they come up."""
+    return AdaptiveFactor(points, FEEDBACK, interval_s)
 
 
 def solve(

@@ -17,6 +17,7 @@ from hevopt.strategies._rules import (
     neutral_outcome,
     rules_of,
 )
+from hevopt.strategies._rules_driven import DrivenRule
 
 _THRESHOLDS = 24
 
@@ -34,6 +35,11 @@ def start(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> C
         for threshold in thresholds_w
     ]
     return calibrated(rules, members, lambda member: member["corrected_kg"])
+
+
+def start_on(problem: Problem, points: Problem, interval_s: float) -> DrivenRule:
+    """The member that suits the problem best, on operating points: any of them, however often."""
+    return DrivenRule(start(problem), points, interval_s)
 
 
 def solve(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Plan:

@@ -15,6 +15,7 @@ from hevopt.strategies._rules import (
     neutral_outcome,
     rules_of,
 )
+from hevopt.strategies._rules_driven import DrivenRule
 
 _CAPS = 10
 _THRESHOLDS = 4
@@ -40,6 +41,11 @@ def start(problem: Problem) -> Calibrated:
         for cap, engine in engines.items()
     ]
     return calibrated(rules, members, lambda member: member["nox_kg"])
+
+
+def start_on(problem: Problem, points: Problem, interval_s: float) -> DrivenRule:
+    """The member that suits the problem best, on operating points: any of them, however often."""
+    return DrivenRule(start(problem), points, interval_s)
 
 
 def solve(problem: Problem) -> Plan:

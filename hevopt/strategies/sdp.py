@@ -46,18 +46,14 @@ from hevopt.problem.switching import joined_switching
 from hevopt.problem.table import Signals
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import _policy_kernels as policies
+from hevopt.strategies._chain import Chain, chain_of, classes_of
 from hevopt.strategies.stepper import driven
 
 ENERGY_NODES = 41
-SPEED_BIN_MPS = 5.0
-POWER_BIN_W = 6000.0
-ROWS_PER_CLASS = 3
 # Memory of the charge: the longer, the softer it is held.
 MEMORY_S = 150.0
 # More than the mean stop gives back: gentle ones give more, and a soft penalty follows its reference in part.
 RECOVERED_SHARE = 2.3
-# Visits that every class is taken to have had, spread as all classes are.
-_SMOOTHING = 0.5
 _IMPROVEMENTS_MAX = 60
 _SWEEPS = 40
 _TOLERANCE = 1e-3
@@ -66,28 +62,12 @@ _EXCESS = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Chain(Shown):
-    """Demand as a Markov chain.
-
-    speed_mps, power_w: (class,) centres; class 0 is standing
-    transition: (class, class) [from, to]; rows: (row,) steps of the joined training that stand for classes
-    row_class: (row,); row_share: (row,) weight of each within its class
-    """
-
-    speed_mps: Array
-    power_w: Array
-    transition: Array
-    rows: Indices
-    row_class: Indices
-    row_share: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PolicyMap(Shown):
     """A policy map on its way: the value ahead (class, mode, node), and the class of each step, (time,)."""
 
     problem: Problem
     choices: Choices
+    chain: Chain
     ahead: Array
     step_class: Indices
     notes: Mapping[str, Any]
@@ -115,13 +95,30 @@ def start(
     recovered = RECOVERED_SHARE * _recovered_jpv2(training)
     chain = chain_of([_signals(other) for other in training])
     ahead, settled = _policy_map(problem, training, chain, price, recovered, nodes, memory_s)
-    every = choices_of(problem)
-    require_choices(problem, every, "sdp")
     notes = {
         "training": len(training), "classes": len(chain.speed_mps), "nodes": nodes,
         "memory_s": memory_s, "price_kgpj": price, "recovered_jpv2": recovered, "settled": settled,
     }  # fmt: skip
-    return PolicyMap(problem, every, ahead, classes_of(chain, _signals(problem)), notes)
+    return _mapped(problem, chain, ahead, notes)
+
+
+def start_on(
+    problem: Problem, points: Problem, interval_s: float, *, training: Sequence[Problem]
+) -> PolicyMap:
+    """The strategy on operating points, asked for any of them, however often."""
+    if points.table.modes != problem.table.modes:
+        raise DataError(
+            f"sdp: operating points have {points.table.modes} modes, the cycle {problem.table.modes}; a map of one "
+            "cannot be followed on the other; use a_ecms"
+        )
+    learnt = start(problem, training)
+    return _mapped(points, learnt.chain, learnt.ahead, learnt.notes)
+
+
+def _mapped(problem: Problem, chain: Chain, ahead: Array, notes: Mapping[str, Any]) -> PolicyMap:
+    every = choices_of(problem)
+    require_choices(problem, every, "sdp")
+    return PolicyMap(problem, every, chain, ahead, classes_of(chain, _signals(problem)), notes)
 
 
 def solve(
@@ -131,52 +128,6 @@ def solve(
     """The plan of a policy map learnt from `training`: problems of the same car on other cycles."""
     stepper = start(problem, training, nodes=nodes, memory_s=memory_s)
     return Plan(driven(problem, stepper)[0], stepper.notes)
-
-
-def chain_of(signals: Sequence[Signals]) -> Chain:
-    """The chain of one or more cycles, each read from its start to its end and round again."""
-    speed = np.concatenate([s.speed_mps for s in signals])
-    power = np.concatenate([s.wheel_power_w for s in signals])
-    bins = np.stack([np.floor(speed / SPEED_BIN_MPS), np.round(power / POWER_BIN_W)])
-    bins = np.where(speed > 0, bins, -1.0e6)
-    _, member = np.unique(bins, axis=1, return_inverse=True)
-    member = member.ravel()
-    count = np.bincount(member)
-    speed_mps, power_w = (np.bincount(member, weights=values) / count for values in (speed, power))
-    following = np.concatenate(
-        [
-            np.roll(part, -1)
-            for part in np.split(member, np.cumsum([len(s.speed_mps) for s in signals])[:-1])
-        ]
-    )
-    visits = np.zeros((len(count), len(count)))
-    np.add.at(visits, (member, following), 1.0)
-    visits += _SMOOTHING * count / count.sum()
-    rows, row_class = _representatives(member, power)
-    share = 1.0 / np.bincount(row_class)[row_class]
-    transition = visits / visits.sum(axis=1, keepdims=True)
-    return Chain(speed_mps, power_w, transition, rows, row_class, share)
-
-
-def classes_of(chain: Chain, signals: Signals) -> Indices:
-    """(time,) class of each step: standing, or the nearest centre in bins of speed and power."""
-    away = ((signals.speed_mps[:, None] - chain.speed_mps) / SPEED_BIN_MPS) ** 2
-    away += ((signals.wheel_power_w[:, None] - chain.power_w) / POWER_BIN_W) ** 2
-    moving = signals.speed_mps > 0
-    away[np.not_equal.outer(moving, chain.speed_mps > 0)] += 1e6
-    nearest: Indices = np.argmin(away, axis=1)
-    return nearest
-
-
-def _representatives(member: Indices, power_w: Array) -> tuple[Indices, Indices]:
-    """Rows that stand for each class, at even quantiles of its wheel power, and their classes."""
-    rows = []
-    for z in range(member.max() + 1):
-        inside = np.flatnonzero(member == z)
-        inside = inside[np.argsort(power_w[inside], kind="stable")]
-        wanted = (np.arange(ROWS_PER_CLASS) + 0.5) / ROWS_PER_CLASS * len(inside)
-        rows.append(np.unique(inside[wanted.astype(np.int64)]))
-    return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(r) for r in rows])
 
 
 def _policy_map(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.forward import _motor_kernels as motor
+from hevopt.forward.asked import Asking, follow_asked
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of
 from hevopt.forward.run import STEP_S, ForwardRun, Handling, follow
@@ -17,6 +19,7 @@ from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.problem import Trajectory
 from hevopt.strategies import strategy_named
 from hevopt.studies.case import Case, prepare
+from hevopt.studies.deciding import decider_of, decides
 from hevopt.studies.rows import Row, is_neutral
 from hevopt.studies.settings import Settings
 from hevopt.studies.solved import check_horizon, run_case
@@ -27,6 +30,18 @@ KINDS = ("standing", "launch", "change", "braking", "driving")
 _MOVES_MPS = 0.1
 
 
+_ASKING = Asking()
+
+
+class Manner(NamedTuple):
+    """How a solved case is driven forward; the fields are those of `drive`."""
+
+    step_s: float = STEP_S
+    handling: Handling | None = None
+    asking: Asking = _ASKING
+    replay: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class DrivenPlan(Shown):
     """A forward run and its backward twin.
@@ -35,8 +50,9 @@ class DrivenPlan(Shown):
     corrected_l_per_100km: less what stored energy above the asked end charge is worth, at the price of the proof
     bound_l_per_100km: least of fuel and weighted NOx of any plan that follows the cycle to the same end charge; a
     car that is driven may fall below it, as it does not follow exactly, and its engine gives its momentum back
-    difference_percent: kind of step -> forward less backward, charge-corrected, as a share of the backward fuel
+    difference_percent: kind of step -> forward less backward, charge-corrected, as a share of backward's
     marks: what is to be known of the run beside its figures
+    asked: how the strategy was asked on the way; None where its plan was replayed
     """
 
     run: ForwardRun
@@ -49,6 +65,7 @@ class DrivenPlan(Shown):
     difference_percent: Mapping[str, float]
     charge_error: float
     marks: tuple[str, ...]
+    asked: Asking | None = None
 
     @property
     def change_percent(self) -> float:
@@ -75,28 +92,60 @@ def drive(
     settings: Settings | None = None,
     step_s: float = STEP_S,
     handling: Handling | None = None,
+    asking: Asking = _ASKING,
+    replay: bool = False,
 ) -> DrivenPlan:
-    """A strategy's plan of a car on a cycle, driven forward by a driver at the pedals.
+    """A strategy on a car on a cycle, driven forward by a driver at the pedals.
 
     step_s: 0.001 to 0.1 s; handling: tyres, clutch, gear changes and driver
+    asking: how often a strategy decides that can on the way; replay: its plan is driven, as that of all others is
     A trace that is missed is driven on, and the run says where. DataError for what cannot be driven forward.
     """
     settings = replace(settings or Settings(), allow_shortfall=True)
     check_horizon(settings.horizon_s, [strategy])
     strategy_named(strategy)
-    line = line_of(car)
+    asking.check()
+    line_of(car)
     case = prepare(car, cycle, settings)
     row, _, trajectory = run_case(case, strategy, settings.horizon_s)
-    plan = replay_of(trajectory, line)
-    run = follow(car, cycle, plan, step_s=step_s, handling=handling, line=line)
+    how = Manner(step_s, handling, asking, replay)
+    return drive_solved(case, strategy, settings.horizon_s, (row, trajectory), how)
+
+
+def drive_solved(
+    case: Case,
+    strategy: str,
+    horizon_s: float | None,
+    solved: tuple[Row, Trajectory],
+    how: Manner,
+) -> DrivenPlan:
+    """A case that a strategy has solved, with its row and trajectory, driven forward."""
+    car, (row, trajectory), line = case.car, solved, line_of(case.car)
+    asked = None
+    if how.replay or not decides(strategy):
+        plan = replay_of(trajectory, line)
+        run = follow(car, case.cycle, plan, step_s=how.step_s, handling=how.handling, line=line)
+    else:
+        decider = decider_of(case, strategy, horizon_s, how.asking)
+        asked = decider.asking
+        run = follow_asked(
+            car, case.cycle, decider, trajectory,
+            step_s=how.step_s, handling=how.handling, line=line,
+        )  # fmt: skip
     _check_moved(run)
-    return beside(case, strategy, row, trajectory, run)
+    return beside(case, strategy, row, trajectory, run, asked=asked)
 
 
 def beside(
-    case: Case, strategy: str, row: Row, trajectory: Trajectory, run: ForwardRun
+    case: Case,
+    strategy: str,
+    row: Row,
+    trajectory: Trajectory,
+    run: ForwardRun,
+    *,
+    asked: Asking | None = None,
 ) -> DrivenPlan:
-    """A forward run held against the trajectory that it replays."""
+    """A forward run held against the trajectory that it replays, or that its strategy drives backward."""
     car, end_j = run.car, float(run.energy_j[-1])
     price, surplus_j = case.certificate.price_kgpj, end_j - case.problem.end_min_j
 
@@ -115,6 +164,7 @@ def beside(
         _difference(trajectory, run, price),
         float(run.soc[-1] - np.interp(run.time_s[-1], case.cycle.time_s, trajectory.soc)),
         _marks(case, run, surplus_j),
+        asked,
     )
 
 
@@ -144,7 +194,7 @@ def _marks(case: Case, run: ForwardRun, surplus_j: float) -> tuple[str, ...]:
 
 
 def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> dict[str, float]:
-    """Charge-corrected fuel, forward less backward, by kind of step, in per cent of the backward fuel."""
+    """Charge-corrected fuel, forward less backward, by kind of step, in per cent of the backward one's."""
     table, flows, books = trajectory.problem.table, trajectory.flows, run.books.flows
     times = np.append(table.time_s, table.time_s[-1] + table.step_s[-1])
 
@@ -158,7 +208,8 @@ def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> d
     drained_j = flows["battery_chemical_w"] * table.step_s + trajectory.switch_energy_j
     backward = trajectory.fuel_kg + price_kgpj * drained_j
     kinds = kinds_of(trajectory, run, times)
-    total = float(np.sum(trajectory.fuel_kg))
+    end_min_j = trajectory.problem.end_min_j
+    total = trajectory.total_fuel_kg - price_kgpj * (trajectory.end_j - end_min_j)
     gap = 100 * (forward - backward) / total if total > 0 else forward * np.nan
     return {kind: float(np.sum(gap[kinds == n])) for n, kind in enumerate(KINDS)}
 

@@ -40,7 +40,7 @@ def run_case(
         require_nox(case.car, f"strategy {strategy}")
     plan, trajectory, solve_s = case.dp_plan, case.dp_trajectory, case.dp_s
     if strategy != "dp":
-        settings = _told(case, chosen, horizon_s)
+        settings = told(case, chosen, horizon_s)
         began = perf_counter()
         plan = chosen.solve(case.problem, **settings)
         solve_s = perf_counter() - began
@@ -55,7 +55,7 @@ def run_case(
     return row, plan, trajectory
 
 
-def _told(case: Case, chosen: Strategy, horizon_s: float | None) -> dict[str, Any]:
+def told(case: Case, chosen: Strategy, horizon_s: float | None) -> dict[str, Any]:
     """What a strategy is told beyond the problem: its preview, the shipped cycles but this one to learn from."""
     settings: dict[str, Any] = {}
     if chosen.previews and horizon_s is not None:

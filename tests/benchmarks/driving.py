@@ -12,7 +12,7 @@ from forward.drives import plan_of
 
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward.lines import line_of
-from hevopt.forward.run import Handling, follow, loop_car, shifting_of, task_of
+from hevopt.forward.run import follow, loop_car, task_of, whole_handling
 
 REPEATS = 5
 
@@ -21,10 +21,10 @@ def main() -> None:
     """The loop alone, and with books and drive quality, of an NEDC at 100 Hz; 1000 cars are 1000 loops."""
     for name in ("A", "C2", "E"):
         car, cycle, plan, _ = plan_of(name)
-        line, handling = line_of(car), Handling()
-        driven = loop_car(car, line, handling, shifting_of(car))
+        line = line_of(car)
+        driven = loop_car(car, line, whole_handling(car, None))
         record = np.zeros((round(cycle.duration_s / 0.01), col.COLUMNS))
-        task = task_of(cycle, plan)
+        task = task_of(cycle, plan, cycle.time_s)
         loops, runs = [], []
         for _ in range(REPEATS + 1):
             began = process_time()

@@ -88,3 +88,17 @@ def test_performance_prints_times_and_draws_the_forces(hevopt, tmp_path):
 def test_bad_input_of_performance_is_one_message(hevopt, words, message):
     seen = hevopt("performance", *words)
     assert seen.status == 2 and message in seen.err and seen.err.count("\n") == 1, seen.err
+
+
+def test_a_strategy_decides_on_the_way_or_is_replayed_as_asked(hevopt, tmp_path):
+    from hevopt.driving.cycle import load_cycle
+
+    whole = load_cycle("nedc")
+    lines = [f"{t:g},{v:.6f}" for t, v in zip(whole.time_s[:80], whole.speed_mps[:80], strict=True)]
+    cycle = tmp_path / "part.csv"
+    cycle.write_text("\n".join(["time_s,speed_mps", *lines]) + "\n")
+    words = ("drive", "C2", "--strategy", "a_ecms", "--cycle", str(cycle), "--step", "0.1")
+    assert "decided on the way, every 0.5 s" in hevopt(*words).out
+    assert "its plan for the cycle was replayed" in hevopt(*words, "--replay").out
+    refused = hevopt(*words, "--decide-every", "0")
+    assert refused.status == 2 and "allowed: 0.02 to 10 s" in refused.err

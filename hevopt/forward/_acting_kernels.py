@@ -1,0 +1,220 @@
+"""What acts in a step: what driver and plan ask for, who gives it, how engine and clutch are kept. Compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt._compile import compiled
+from hevopt.car.handling import Shifting
+from hevopt.forward import _motor_kernels as motor
+from hevopt.forward import _rows_kernels as col
+from hevopt.forward._contact_kernels import Body
+from hevopt.forward._lever_kernels import (
+    Lever,
+    keeping_pace_nm,
+    moves_machine,
+)
+from hevopt.forward._limits_kernels import Limits, at, share_of_braking
+from hevopt.forward._pedal_kernels import DriverGains, PedalState, wanted_at
+from hevopt.forward._rows_kernels import Inputs, State, Ways, turning
+from hevopt.forward._share_kernels import (
+    AskedStep,
+    Shared,
+    following_nm,
+    machine_range,
+    shared,
+)
+from hevopt.problem._battery_kernels import BatteryArrays
+from hevopt.units import STANDARD_GRAVITY_MPS2
+
+Array = NDArray[np.float64]
+
+_FEEDBACK_SPEED_RADPS = 50.0
+
+
+class LoopCar(NamedTuple):
+    """All that the loop knows of a car."""
+
+    body: Body
+    ways: Ways
+    fast_way: NDArray[np.int64]
+    fast_radps: Array
+    limits: Limits
+    battery: BatteryArrays
+    window_j: tuple[float, float]
+    shifting: Shifting
+    driver: DriverGains
+
+
+class LoopTask(NamedTuple):
+    """A trace, and a plan for it of which every step holds from one of its times to the next.
+
+    time_s, speed_mps: (time + 1,); slope_rad: (time,)
+    from_s, energy_j: (step + 1,); way, engine_on, apart, machine_nm: (step,)
+    energy_j: what the plan has stored; apart: the clutch is open while the car is braked, or no gear is in
+    """
+
+    time_s: Array
+    speed_mps: Array
+    slope_rad: Array
+    from_s: Array
+    way: NDArray[np.int64]
+    engine_on: NDArray[np.bool_]
+    apart: NDArray[np.int64]
+    machine_nm: Array
+    energy_j: Array
+
+
+class Now(NamedTuple):
+    """What a step begins with, beside the car's state; step, k: of the plan and of the trace."""
+
+    step: int
+    k: int
+    at_s: float
+    energy_j: float
+    side_radps: float
+
+
+@compiled(inline="always")
+def _set_nm(car: LoopCar, task: LoopTask, now: Now, state: State, machine_radps: float) -> float:
+    """The machine's set-point: the plan's torque, and what keeps the plan's stored energy."""
+    if len(car.limits.load_nm) > 0:
+        turns = state.side_radps > 0.3 * car.limits.idle_radps
+        return following_nm(state.side_radps, car.limits) if turns else 0.0
+    d, time = now.step, task.from_s
+    share = (now.at_s - time[d]) / (time[d + 1] - time[d])
+    planned = task.energy_j[d] + share * (task.energy_j[d + 1] - task.energy_j[d])
+    power = car.driver.charge_per_s * (now.energy_j - planned)
+    return task.machine_nm[d] + power / max(abs(machine_radps), _FEEDBACK_SPEED_RADPS)
+
+
+@compiled(inline="always")
+def is_called(task: LoopTask, now: Now, state: State, driver: DriverGains) -> bool:
+    """Whether an engine that the car will move off with is started: so early that it turns by then."""
+    d = now.step + 1
+    if state.speed_mps > 0.0 or d >= len(task.engine_on) or not task.engine_on[d]:
+        return False
+    if wanted_at(task.time_s, task.speed_mps, task.from_s[d], now.k) != 0.0:
+        return False
+    return now.at_s + driver.start_s >= task.from_s[d] - 1e-9
+
+
+@compiled(inline="always")
+def asked_of(
+    car: LoopCar,
+    task: LoopTask,
+    now: Now,
+    state: State,
+    pedal: PedalState,
+    lever: Lever,
+    machine_radps: float,
+) -> AskedStep:
+    """What the driver and the plan ask of engine and machine."""
+    limits, radius = car.limits, car.body.radius_m
+    low, high = machine_range(machine_radps, limits)
+    if now.energy_j <= car.window_j[0]:
+        high = min(high, 0.0)
+    if now.energy_j >= car.window_j[1]:
+        low = max(low, 0.0)
+    set_nm = _set_nm(car, task, now, state, machine_radps)
+    if len(limits.load_nm) == 0:
+        set_nm = min(max(set_nm, low), high)
+    least = at(limits.least_nm, limits.engine_step, state.side_radps)
+    most = at(limits.full_nm, limits.engine_step, state.side_radps)
+    braking = pedal.force_n < 0.0
+    accel = 0.0 if pedal.holds else pedal.accel_mps2 / radius
+    wheel_nm = 0.0 if pedal.holds else pedal.force_n * radius
+    return AskedStep(wheel_nm, accel, set_nm, low, high, least, most, braking)
+
+
+@compiled(inline="always")
+def inputs_of(
+    car: LoopCar,
+    state: State,
+    pedal: PedalState,
+    joint: motor.Joined,
+    lever: Lever,
+    split: Shared,
+    slope_rad: float,
+    machine_nm: Array,
+    step_s: float,
+) -> Inputs:
+    """The plant's inputs: how the engine is kept, what the clutch and the brakes hold."""
+    limits, driver = car.limits, car.driver
+    way, output = lever.way, len(car.ways.inertia_kgm2) - 1
+    wheel, n = state.speed_mps / car.body.radius_m, state.side_radps
+    ratio = turning(car.ways.wheel, way, lever.from_way, lever.blend, output)
+    low = at(limits.least_nm, limits.engine_step, n)
+    high = at(limits.full_nm, limits.engine_step, n)
+    rate, capacity, engine = 1.0 - np.exp(-step_s / driver.governor_s), 0.0, split.engine_nm
+    if joint.phase == motor.TURNING:
+        target = limits.idle_radps
+        if joint.launches:
+            target = joint.launch_radps
+        elif joint.closing > 0.0 or joint.cause == motor.CHANGE:
+            target = max(ratio * (wheel + pedal.accel_mps2 / car.body.radius_m * step_s), target)
+            rate = 1.0 if joint.closing > 0.0 else rate
+        governed = n + rate * (target - n)
+        capacity = motor.capacity_nm(joint, split.clutch_nm, n - ratio * wheel, car.body.clutch)
+    else:
+        low, high, engine = -np.inf, np.inf, 0.0
+        if joint.phase == motor.STARTING:
+            governed = min(n + limits.idle_radps / driver.start_s * step_s, limits.idle_radps)
+            governed = max(governed, min(n, limits.idle_radps))
+        else:
+            governed = max(n - limits.idle_radps / driver.stop_s * step_s, 0.0)
+    brake = split.brake_nm
+    if pedal.holds:
+        brake = -pedal.force_n * car.body.radius_m
+    return Inputs(machine_nm, engine, governed, low, high, capacity, brake, slope_rad, way,
+                  lever.from_way, lever.blend)  # fmt: skip
+
+
+@compiled(inline="always")
+def _friction_nm(car: LoopCar, asked: AskedStep, speed_mps: float) -> float:
+    """What the friction brakes take at least while the machine may brake as well, at the wheels."""
+    if not asked.braking or asked.wheel_nm >= 0.0:
+        return 0.0
+    weight_n = car.body.mass_kg * STANDARD_GRAVITY_MPS2
+    rate = -asked.wheel_nm / (car.body.radius_m * weight_n)
+    return -asked.wheel_nm * (1.0 - share_of_braking(speed_mps, rate, car.limits))
+
+
+@compiled(inline="always")
+def split_of(
+    car: LoopCar,
+    rows: Array,
+    state: State,
+    asked: AskedStep,
+    joint: motor.Joined,
+    lever: Lever,
+    machine_nm: Array,
+    step_s: float,
+) -> Shared:
+    """Torques of engine, machine and brakes, and what the clutch has to pass.
+
+    A machine whose gear changes brings its own rotor along; between gears it does nothing else, while a ratio that
+    moves under load passes the rest as well.
+    """
+    joints, moves, pace = car.ways.load.shape[2], moves_machine(car.ways, lever), 0.0
+    cut = moves and lever.gap_s > 0.0
+    if moves:
+        pace = keeping_pace_nm(car.ways, state, lever, state.speed_mps / car.body.radius_m, step_s)
+        per_nm = rows[lever.way, state.variant, col.MACHINES]
+        low, high = (0.0, 0.0) if cut else (asked.low_nm, asked.high_nm)
+        set_nm = 0.0 if cut else min(max(asked.set_nm + pace, low), high)
+        wheel_nm = asked.wheel_nm + (0.0 if cut else per_nm * pace)
+        asked = AskedStep(wheel_nm, asked.accel, set_nm, low, high, asked.least_nm, asked.most_nm,
+                      asked.braking)  # fmt: skip
+    friction = _friction_nm(car, asked, state.speed_mps)
+    asked = AskedStep(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
+                  asked.least_nm, asked.most_nm, asked.braking)  # fmt: skip
+    closed = joint.closing > 0.0
+    split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
+                   joint.launches, machine_nm)  # fmt: skip
+    given = pace if cut else split.machine_nm
+    if joint.phase != motor.TURNING and car.ways.side[lever.way, 1] != 0.0:
+        given = 0.0
+    brake = split.brake_nm + friction
+    return Shared(split.engine_nm, given, split.clutch_nm, brake, split.full and not cut)

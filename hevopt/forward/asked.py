@@ -1,0 +1,167 @@
+"""A car driven along a trace by a driver at the pedals, engine and machine by a strategy that is asked on the way.
+
+At every decision the strategy is told what is stored and, as a row of a control table, where the car is: the
+operating point nearest to the gear, the speed and the torque at the wheels that the driver asks for, or the step
+of the cycle for a strategy that looks ahead along it. What it decides holds until the next decision: the engine on
+or off, gears beside the listed one, and while the engine drives the machine's torque, of which the engine gives the
+rest. Gears and clutch are the driver's, as in a replayed plan.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.driving.cycle import Cycle
+from hevopt.errors import DataError, InfeasibleError
+from hevopt.forward import _drive_kernels as col
+from hevopt.forward._acting_kernels import LoopTask
+from hevopt.forward.lines import Line, line_of
+from hevopt.forward.plans import ForwardPlan, driver_gears, flows_of, signals_of
+from hevopt.forward.run import (
+    STEP_S,
+    ForwardRun,
+    Handling,
+    loop_car,
+    run_of,
+    steps_of,
+    task_of,
+    whole_handling,
+)
+from hevopt.powertrain.points import OperatingPoints
+from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.battery import soc
+from hevopt.problem.holding import turning_modes
+from hevopt.problem.problem import Problem, Trajectory
+from hevopt.strategies.stepper import Stepper
+
+_INTERVALS_S = (0.02, 10.0)
+_LONGEST_DWELL_S = 60.0
+
+
+class Asking(NamedTuple):
+    """interval_s: from one decision to the next; dwell_s: least time for which the engine stays on, and off."""
+
+    interval_s: float = 0.5
+    dwell_s: float = 1.0
+
+    def check(self) -> None:
+        """DataError for a figure out of range."""
+        low, high = _INTERVALS_S
+        if not low <= self.interval_s <= high:  # nor NaN
+            raise DataError(
+                f"decisions every {self.interval_s:g} s; allowed: {low:g} to {high:g} s"
+            )
+        if not 0 <= self.dwell_s <= _LONGEST_DWELL_S:
+            raise DataError(f"dwell {self.dwell_s:g} s; allowed: 0 to {_LONGEST_DWELL_S:g} s")
+
+
+class Decision(NamedTuple):
+    """What a decision has the car do; gears: chosen beside the listed one, which it may choose as well, else 0."""
+
+    engine_on: bool
+    machine_nm: float
+    listed: int
+    gears: tuple[tuple[str, int], ...]
+
+
+class Decider:
+    """A strategy on its way, and what its decisions mean.
+
+    problem: of which every row is a step or an operating point; points: those, None for the steps of the cycle
+    stepper: asked for rows of the problem, and for those of `with_holding` where there are points
+    """
+
+    def __init__(
+        self,
+        name: str,
+        stepper: Stepper,
+        problem: Problem,
+        points: OperatingPoints | None,
+        asking: Asking,
+    ) -> None:
+        self.name, self.stepper, self.asking = name, stepper, asking
+        self.problem, self.points = problem, points
+        table = problem.table
+        flows, columns = flows_of(table)
+        self._states = flows.states(columns)
+        self._machine_nm = flows[f"{flows.machines[0]}_torque_nm"][:, columns]
+        self._turning = turning_modes(problem)
+        on = np.array([state.engine_on for state in self._states])
+        self._keeps: list[Flags] = [
+            np.asarray(table.feasible[:, on == turns].any(axis=1)) for turns in (False, True)
+        ]
+        self._mode, self._since_s = problem.start_mode, -np.inf
+
+    def decide(self, at_s: float, k: int, gear: int, look: col.Look, energy_j: float) -> Decision:
+        """The command from a time on, in step k of the cycle and a gear; look: what the driver asks for."""
+        row = k if self.points is None else self.points.row(gear, *look)
+        turns = bool(self._turning[self._mode])
+        held = self.points is not None and at_s - self._since_s < self.asking.dwell_s - 1e-9
+        asked = row + len(self.problem.table.step_s) if held and self._keeps[turns][row] else row
+        try:
+            control = self.stepper.decide(asked, energy_j, self._mode)
+        except InfeasibleError as error:
+            charge = float(soc(self.problem.battery, energy_j))
+            raise InfeasibleError(
+                f"{self.name}: no decision at t = {at_s:g} s, gear {gear}, {look.speed_mps:.2f} m/s, "
+                f"{look.wheel_nm:.0f} Nm at the wheels, SOC {charge:.4f}: {error}"
+            ) from None
+        self._mode, state = int(self.problem.table.mode[control]), self._states[control]
+        if state.engine_on != turns:
+            self._since_s = at_s
+        return Decision(
+            state.engine_on, float(self._machine_nm[row, control]), state.listed, state.gears
+        )
+
+
+def follow_asked(
+    car: Architecture,
+    cycle: Cycle,
+    decider: Decider,
+    planned: Trajectory,
+    *,
+    step_s: float = STEP_S,
+    handling: Handling | None = None,
+    line: Line | None = None,
+) -> ForwardRun:
+    """The car driven along the cycle, a strategy deciding on the way.
+
+    planned: the strategy's trajectory on the cycle as the backward model drives it, whose gears the driver takes
+    and beside whose charge the run is shown. Errors as of `follow`, InfeasibleError where a decision is impossible.
+    """
+    line, handling = line or line_of(car), whole_handling(car, handling)
+    decider.asking.check()
+    exact_s, record = steps_of(cycle, step_s, handling)
+    every = max(round(decider.asking.interval_s / exact_s), 1)
+    from_s = cycle.time_s[0] + exact_s * np.append(np.arange(0, len(record), every), len(record))
+    # Nothing is planned, so that there is no charge to be kept.
+    driver = handling.driver._replace(charge_per_s=0.0)
+    driven = loop_car(car, line, handling._replace(driver=driver))
+    gears, step, task = _undecided(cycle, from_s, planned)
+    work, loop = col.work_of(driven.ways), col.begun(driven, task, float(planned.energy_j[0]))
+    for d, (at_s, k) in enumerate(zip(from_s[:-1].tolist(), step.tolist(), strict=True)):
+        look = col.seen(driven, task, loop, at_s, decider.asking.interval_s, exact_s)
+        command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
+        task.way[d] = line.index(command.listed or int(gears[k]), command.gears)
+        task.engine_on[d], task.machine_nm[d] = command.engine_on, command.machine_nm
+        if d == 0:
+            loop = col.begun(driven, task, loop.energy_j)
+        part = record[d * every : (d + 1) * every]
+        loop = col.advance(driven, task, work, loop, d * every, part, exact_s)
+    planned_j = np.asarray(planned.energy_j, dtype=np.float64)
+    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s)
+
+
+def _undecided(
+    cycle: Cycle, from_s: Array, planned: Trajectory
+) -> tuple[Indices, Indices, LoopTask]:
+    """The driver's gear at each step of the cycle, the step of each decision, and the task before any of them."""
+    table, count = planned.problem.table, len(from_s) - 1
+    gears, open_while = driver_gears(signals_of(table))
+    step = np.maximum(np.searchsorted(table.time_s, from_s[:-1] + 1e-9, "right") - 1, 0)
+    plan = ForwardPlan(
+        np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool), open_while[step], np.zeros(count),
+        np.full(count + 1, float(planned.energy_j[0])),
+    )  # fmt: skip
+    return gears, step, task_of(cycle, plan, from_s)
