@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 # Rooms with faults left, and how many mypy finds in each today: lower or strike a number, never raise it.
-OPEN = {"measured": 208, "pages": 62, "forward": 12}
+OPEN = {"measured": 208, "pages": 53, "forward": 12}
 
 
 def faults() -> dict[str, list[str]]:

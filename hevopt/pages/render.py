@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from hevopt.files.shown import encodable
+from hevopt.pages.words import explained
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -52,6 +53,7 @@ def _environment() -> Environment:
     )
     environment.filters["fixed"] = fixed
     environment.filters["weights"] = weights
+    environment.filters["explained"] = explained
     return environment
 
 

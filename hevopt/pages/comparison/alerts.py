@@ -1,13 +1,20 @@
 """What a reader must know before believing a comparison."""
 
+from itertools import groupby
+from math import inf
+
 from hevopt.pages.alert import Alert
-from hevopt.pages.comparison.results import CarFigures, Results, RowFigures
+from hevopt.pages.comparison.results import Results, RowFigures
+from hevopt.pages.comparison.saved_car import CarFigures
 from hevopt.pages.comparison.verdict import is_nothing
 from hevopt.pages.render import fixed
 from hevopt.studies.status import Mark
 
 LOOSE_PERCENT = 0.2
 _STEPS_LISTED = 5
+# A spell of the engine below this is one that no driver would accept [E].
+SHORT_S = 3.0
+_ROWS_LISTED = 5
 # What the marks say of the charge at the end.
 _CHARGES = {
     Mark.NOT_NEUTRAL: "stored energy changes",
@@ -17,8 +24,9 @@ _CHARGES = {
 
 
 def alerts(results: Results) -> list[Alert]:
-    """The five checks, in the order of a reader's doubts; each speaks also where there is nothing to say."""
-    return [_steps(results), _neutral(results), _limits(results), _loose(results), _solver(results)]
+    """The checks, in the order of a reader's doubts; each speaks also where there is nothing to say."""
+    checks = (_steps, _neutral, _limits, _spells, _loose, _solver)
+    return [check(results) for check in checks]
 
 
 def _steps(results: Results) -> Alert:
@@ -79,6 +87,35 @@ def _limits(results: Results) -> Alert:
     return Alert(
         "Map edges and limits", bool(lines), head + lines if lines else [nothing], grave=False
     )
+
+
+def _spells(results: Results) -> Alert:
+    """Spells of the engine, on or off, that end sooner than a driver would have them."""
+    found = []
+    for row in results.rows:
+        if row.detail is None:
+            continue
+        step_s = results.cars[row.figures.architecture].step_s
+        inner = _inner_spells(row.detail.trace.engine_speed_radps, step_s)
+        sides = (("off", [s for on, s in inner if not on]), ("on", [s for on, s in inner if on]))
+        short = [(min(of), side) for side, of in sides if min(of, default=inf) < SHORT_S]
+        if short:
+            told = ", ".join(f"shortest {side} {s:g} s" for s, side in short)
+            name = f"{row.figures.architecture} {row.figures.strategy}"
+            found.append((min(short), f"{name}: {row.figures.engine_starts} starts, {told}."))
+    found.sort(key=lambda entry: entry[0])
+    lines = [line for _, line in found[:_ROWS_LISTED]]
+    if len(found) > _ROWS_LISTED:
+        lines.append(f"And {len(found) - _ROWS_LISTED} more; see Operation.")
+    nothing = f"No row turns the engine on or off for less than {SHORT_S:g} s."
+    return Alert("Short spells of the engine", bool(lines), lines or [nothing], grave=False)
+
+
+def _inner_spells(speed_radps: list[float], step_s: list[float]) -> list[tuple[bool, float]]:
+    """Whether the engine turns, and for how long, of all spells but those that the cycle's ends cut off."""
+    steps = zip((speed > 0 for speed in speed_radps), step_s, strict=True)
+    spells = [(on, sum(s for _, s in own)) for on, own in groupby(steps, lambda step: step[0])]
+    return spells[1:-1]
 
 
 def _loose(results: Results) -> Alert:

@@ -11,6 +11,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.files.lookup import without_folders
+from hevopt.pages.comparison.about import about_car
 from hevopt.pages.comparison.energy import energy_of
 from hevopt.pages.comparison.maps import engine_map, machine_map
 from hevopt.pages.comparison.operation import (
@@ -22,7 +23,6 @@ from hevopt.pages.comparison.operation import (
     spells_s,
 )
 from hevopt.pages.comparison.results import (
-    CarFigures,
     Detail,
     PublishedFigure,
     Results,
@@ -31,6 +31,7 @@ from hevopt.pages.comparison.results import (
     SavedRow,
     SavedTrace,
 )
+from hevopt.pages.comparison.saved_car import CarFigures
 from hevopt.problem.problem import Plan, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.reproduction.published import published_beside
@@ -149,6 +150,7 @@ def _car(case: Case) -> CarFigures:
             float(100 * (rollout.cost_kg - bound_kg) / bound_kg) if bound_kg > 0 else None
         ),
         engine=engine_map(car),
+        about=about_car(car, case.cycle),
         machine=machine_map(
             car,
             float(np.max(table.flows["machine_speed_radps"][table.feasible], initial=0.0)),

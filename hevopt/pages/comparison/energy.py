@@ -28,6 +28,8 @@ MACHINE_LOSS = "Machine losses"
 BATTERY_LOSS, AUXILIARIES, BRAKES = "Battery losses", "Auxiliaries", "Friction brakes"
 SHAFTS, UNREGAINED = "Spinning shafts", "Spin-up not regained"
 NET_DRAWN = "stored energy drawn, net"
+BURNT, OF_STARTS = "fuel burnt", "fuel of starts and shifts"
+TAKEN_IN_BRAKING = "braking at the wheels"
 SPUN_BEFORE, SPUN_AFTER = "Shafts at the start", "Shafts at the end"
 # A share of all energy below which a link is rounding.
 _TINY = 1e-9
@@ -50,8 +52,8 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
             if energy > enough
         ],
         taken=[
-            Item(name="fuel burnt", energy_j=total["fuel_power_w"]),
-            Item(name="fuel of starts and shifts", energy_j=starts_j),
+            Item(name=BURNT, energy_j=total["fuel_power_w"]),
+            Item(name=OF_STARTS, energy_j=starts_j),
             Item(name=NET_DRAWN, energy_j=total["battery_chemical_w"] + shafts.stored_j),
             Item(name=SPUN_BEFORE, energy_j=shafts.before_j),
         ],
@@ -75,7 +77,7 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
             Item(name=name, energy_j=float(np.sum(np.maximum(power_w, 0) * step_s)))
             for name, power_w in (
                 ("traction at the wheels", wheel),
-                ("braking at the wheels", -wheel),
+                (TAKEN_IN_BRAKING, -wheel),
                 ("into the battery, at its terminals", -battery),
                 ("out of the battery, at its terminals", battery),
             )

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hevopt.pages.comparison.results import CarFigures, Results, SavedTrace
+from hevopt.pages.comparison.results import Results, SavedTrace
 from hevopt.pages.comparison.saved import load_results
+from hevopt.pages.comparison.saved_car import CarFigures
 from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
-from hevopt.pages.comparison.results import MapFigures
+from hevopt.pages.comparison.saved_car import MapFigures
 
 Array = NDArray[np.float64]
 _SPEEDS, _TORQUES = 49, 61

@@ -5,7 +5,9 @@ from statistics import median
 from typing import Any
 
 from hevopt.pages.comparison.alerts import alerts
+from hevopt.pages.comparison.assumptions import assumptions
 from hevopt.pages.comparison.results import Item, Results, SavedRow, Sensitivity
+from hevopt.pages.comparison.sketch import sketch_of
 from hevopt.pages.comparison.verdict import best_rows, charge_asked, reference_row, verdict
 from hevopt.pages.render import render
 from hevopt.studies.rows import marked
@@ -28,6 +30,12 @@ def comparison_page(results: Results) -> str:
         alerts=alerts(results),
         reference=_reference(results),
         charge_asked=charge_asked(results),
+        cars=[
+            (name, car.about, sketch_of(car.about))
+            for name, car in results.cars.items()
+            if car.about is not None
+        ],
+        assumptions=assumptions(results),
         table=[_figures(row) for row in results.rows],
         worth=[_worth(results, row) for row in results.rows if row.detail is not None],
         energy=[_BalanceTable.of(results, row) for row in results.rows if row.detail is not None],

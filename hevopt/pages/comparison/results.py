@@ -11,13 +11,10 @@ from pydantic import BeforeValidator, Field, InstanceOf, PlainSerializer
 from hevopt.bounds.certificate import Claim
 from hevopt.files.lookup import dumped_json
 from hevopt.files.toml import FileModel
+from hevopt.pages.comparison.saved_car import CarFigures, Number, Whole
 from hevopt.studies.status import Status
 
 FORMAT = "hevopt comparison 2"
-# Far beyond any figure, and far from where sums and squares of floats end.
-_NUMBER_MAX = 1e100
-Number = Annotated[float, Field(ge=-_NUMBER_MAX, le=_NUMBER_MAX)]
-Whole = Annotated[int, Field(ge=-(2**53), le=2**53)]
 # Text in JSON.
 SavedStatus = Annotated[InstanceOf[Status], BeforeValidator(Status.read), PlainSerializer(str)]
 SavedClaim = Annotated[InstanceOf[Claim], BeforeValidator(Claim.read), PlainSerializer(str)]
@@ -44,45 +41,6 @@ class RowFigures(FileModel):
     gap_percent: Number | None
     certificate: SavedClaim | None
     solve_s: Number | None
-
-
-class MapFigures(FileModel):
-    """A component over (speed, torque); None where it cannot be used or the figure has no meaning.
-
-    efficiency: of the engine, or of the machine in the direction of its power
-    nox_kgpj: NOx per work, of engines only; limit_nm: largest torque over speed; least_nm: lowest,
-    None beyond a measured engine map's speeds
-    """
-
-    name: str
-    speed_radps: list[Number]
-    torque_nm: list[Number]
-    efficiency: list[list[Number | None]]
-    nox_kgpj: list[list[Number | None]] | None
-    limit_nm: list[Number]
-    least_nm: list[Number | None]
-
-
-class CarFigures(FileModel):
-    """What the rows of one architecture share; lists are (time,).
-
-    price_kgpj: what a joule of end charge is worth, from the certificate; certified_gap_percent: how far dynamic
-    programming's rollout lies above the bound, the certificate's own looseness at most
-    """
-
-    name: str
-    time_s: list[Number]
-    step_s: list[Number]
-    speed_mps: list[Number]
-    wheel_power_w: list[Number]
-    missing_torque_nm: list[Number]
-    soc_min: Number
-    soc_max: Number
-    heating_value_jpkg: Number
-    price_kgpj: Number
-    certified_gap_percent: Number | None
-    engine: MapFigures
-    machine: MapFigures
 
 
 class SavedTrace(FileModel):

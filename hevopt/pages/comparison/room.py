@@ -5,7 +5,8 @@ of 20 000 steps and 65 rows takes 80 MB and 15 million numbers.
 """
 
 from hevopt.errors import DataError
-from hevopt.pages.comparison.results import CarFigures, Number, SavedTrace
+from hevopt.pages.comparison.results import SavedTrace
+from hevopt.pages.comparison.saved_car import CarFigures, Number
 
 # Unpacked.
 MEGABYTES_MAX = 200

@@ -9,8 +9,9 @@ from pydantic import ValidationError
 from hevopt.errors import DataError
 from hevopt.files.lookup import loaded_json, read_bytes
 from hevopt.files.shown import printable
-from hevopt.pages.comparison.results import FORMAT, CarFigures, Results, SavedRow
+from hevopt.pages.comparison.results import FORMAT, Results, SavedRow
 from hevopt.pages.comparison.room import MEGABYTES_MAX, check_room
+from hevopt.pages.comparison.saved_car import CarFigures
 
 _ADVICE = "give a file written by hevopt compare --save"
 _MAGIC = b"\x1f\x8b"
@@ -70,6 +71,8 @@ def _faults_of_car(name: str, car: CarFigures) -> list[str]:
     for key in _OVER_TIME:
         if len(getattr(car, key)) != steps or not steps:
             faults.append(f"cars.{name}.{key}: not of {steps} steps, or of none")
+    if car.about is not None and len(car.about.braking_mps) != len(car.about.braking_share):
+        faults.append(f"cars.{name}.about: not as many speeds as shares of braking")
     for key, drawn in (("engine", car.engine), ("machine", car.machine)):
         speeds, torques = len(drawn.speed_radps), len(drawn.torque_nm)
         over_speed = [

@@ -1,5 +1,7 @@
 """What a comparison says in two sentences."""
 
+from math import inf
+
 from hevopt.pages.comparison.results import Results, RowFigures
 from hevopt.pages.render import fixed
 from hevopt.studies.rows import end_asked_text, marked
@@ -14,7 +16,7 @@ _VOLUME = "\u00a0l/100\u00a0km"
 
 def corrected_cost(row: RowFigures) -> float | None:
     """Objective of a row as fuel volume, charge-corrected: l/100 km of fuel and weighted NOx."""
-    if row.fuel_corrected_l_per_100km is None:
+    if row.fuel_corrected_l_per_100km is None or row.fuel_l_per_100km is None:
         return None
     return cost(row) - row.fuel_l_per_100km + row.fuel_corrected_l_per_100km
 
@@ -22,8 +24,14 @@ def corrected_cost(row: RowFigures) -> float | None:
 def cost(row: RowFigures) -> float:
     """Objective of a row as fuel volume, as driven: what its gap is measured on."""
     if row.bound_l_per_100km is None or row.gap_percent is None:
-        return row.fuel_l_per_100km
+        return row.fuel_l_per_100km or 0.0
     return row.bound_l_per_100km * (1 + row.gap_percent / 100)
+
+
+def _corrected(row: RowFigures) -> float:
+    """`corrected_cost` of a row that was solved, and so has one."""
+    found = corrected_cost(row)
+    return inf if found is None else found
 
 
 def is_nothing(row: RowFigures) -> bool:
@@ -50,15 +58,15 @@ def best_rows(results: Results) -> list[RowFigures]:
     rows = [row for row in solved if row.status.ok] or solved
     if not rows:
         return []
-    near = (1 + _EQUAL_PERCENT / 100) * min(map(corrected_cost, rows))
-    equal = [row for row in rows if corrected_cost(row) <= near]
+    near = (1 + _EQUAL_PERCENT / 100) * min(map(_corrected, rows))
+    equal = [row for row in rows if _corrected(row) <= near]
     return sorted(equal, key=lambda row: (abs(row.delta_energy_percent or 0.0), cost(row)))
 
 
 def verdict(results: Results) -> list[str]:
-    """Two sentences: the best row and what it saves; how close it is to the proven bound.
+    """The best row and what it saves; how close it is to the proven bound; the best that knows no future.
 
-    A third where another end charge than the start's is asked.
+    One more sentence where another end charge than the start's is asked.
     """
     equal = best_rows(results)
     if not equal:
@@ -66,6 +74,7 @@ def verdict(results: Results) -> list[str]:
     return [
         _first(results, equal[0], equal[1:]),
         _second(results, equal[0]),
+        *_causal(results, equal),
         *charge_asked(results),
     ]
 
@@ -80,7 +89,7 @@ def _first(results: Results, best: RowFigures, equal: list[RowFigures]) -> str:
     doubt = "" if best.status.ok else "; no row is free of alerts, see below"
     return (
         f"On {results.cycle}, {best.architecture} with {best.strategy} needs the least {what}{also}: "
-        f"{corrected_cost(best):.4f}{volume}, charge-corrected ({_as_driven(results, best)})"
+        f"{_corrected(best):.4f}{volume}, charge-corrected ({_as_driven(results, best)})"
         f"{_change(results, best)}{doubt}."
     )
 
@@ -109,10 +118,10 @@ def _change(results: Results, best: RowFigures) -> str:
     if base is best:
         return ", itself the reference of all changes"
     summed = best.gap_percent is not None and base.gap_percent is not None
-    whole = corrected_cost(base)
+    whole = _corrected(base)
     if whole < _NOTHING_L_PER_100KM or (results.nox_weight and not summed):
         return ""
-    percent = 100 * (corrected_cost(best) / whole - 1)
+    percent = 100 * (_corrected(best) / whole - 1)
     less = "less" if percent <= 0 else "more"
     return (
         f", {abs(percent):.1f}{_PERCENT} {less} than {results.reference}{marked(base.status)} "
@@ -134,6 +143,35 @@ def _second(results: Results, best: RowFigures) -> str:
         f"use of engine, machine and gears among the tabulated controls takes {best.architecture} below "
         f"{best.bound_l_per_100km:.4f}{_VOLUME}{sum_of} with the same charge at the end."
     )
+
+
+def _causal(results: Results, equal: list[RowFigures]) -> list[str]:
+    """The best row that decides without knowing the rest of the cycle, beside the best of all."""
+    rows = [row.figures for row in results.rows if row.detail is not None]
+    follows = (r for r in rows if not (r.status.others or r.status.shortfall_steps))
+    causal = [row for row in follows if row.strategy in results.causal]
+    if not causal:
+        return []
+    own = min(causal, key=_corrected)
+    if any(own is row for row in equal):
+        also = "It" if own is equal[0] else _name(own)
+        return [f"{also} is causal: it decides without knowing the rest of the cycle."]
+    there = f"{_above(own, equal[0])} above {_name(equal[0])}"
+    least = min((r for r in rows if r.architecture == own.architecture), key=_corrected)
+    if own.architecture != equal[0].architecture and least is not own:
+        there += f" and {_above(own, least)} above the least of {own.architecture}, {_name(least)}"
+    named = f"{_name(own)}{marked(own.status)}"
+    return [
+        f"The best causal strategy, one that does not know the rest of the cycle, is {named}: "
+        f"{_corrected(own):.4f}{_VOLUME}, {there}."
+    ]
+
+
+def _above(row: RowFigures, other: RowFigures) -> str:
+    least = _corrected(other)
+    if least < _NOTHING_L_PER_100KM:
+        return f"{_corrected(row) - least:.3f}{_VOLUME}"
+    return f"{100 * (_corrected(row) / least - 1):.1f}{_PERCENT}"
 
 
 def charge_asked(results: Results) -> list[str]:

@@ -10,8 +10,12 @@ from hevopt.pages.comparison.alerts import alerts
 from hevopt.pages.comparison.page import comparison_page
 from hevopt.pages.comparison.results import Results
 from hevopt.pages.comparison.verdict import best_rows, corrected_cost, verdict
+from hevopt.pages.words import explained
 
-CHECKS = ["Steps not followed", "Charge balance", "Map edges and limits", "Certificates", "Solvers"]
+CHECKS = [
+    "Steps not followed", "Charge balance", "Map edges and limits", "Short spells of the engine", "Certificates",
+    "Solvers",
+]  # fmt: skip
 
 
 def changed(nedc, change):
@@ -43,11 +47,15 @@ def test_the_best_row_is_the_one_of_least_corrected_fuel(nedc):
     best = best_rows(nedc.results)
     assert all(row.fuel_corrected_l_per_100km <= 1.0005 * least for row in best)
     assert (best[0].architecture, best[0].strategy) == ("C2", "dp")
-    first, second = said(nedc.results)
+    first, second, third = said(nedc.results)
     assert f"{best[0].fuel_corrected_l_per_100km:.4f} l/100 km, charge-corrected" in first
     assert f"as driven: fuel {best[0].fuel_l_per_100km:.4f} l/100 km, " in first
     assert "C2 ecms" in first
     assert f"{best[0].gap_percent:.3f} % above a proven lower bound" in second
+    (baseline,) = (row for row in rows if row.strategy == "baseline")
+    above = 100 * (baseline.fuel_corrected_l_per_100km / best[0].fuel_corrected_l_per_100km - 1)
+    assert third.startswith("The best causal strategy, ") and "is A baseline: 4.51" in third
+    assert third.endswith(f" l/100 km, {above:.1f} % above C2 dp.")
 
 
 def test_no_line_ends_between_a_number_and_its_unit(nedc):
@@ -88,7 +96,8 @@ def test_nothing_to_say_is_said(nedc):
     found = by_name(nedc.results)
     assert list(found) == CHECKS
     assert all(alert.lines for alert in found.values())
-    assert [name for name, alert in found.items() if alert.found] == ["Map edges and limits"]
+    notes = ["Map edges and limits", "Short spells of the engine"]
+    assert [name for name, alert in found.items() if alert.found] == notes
 
 
 def test_every_kind_of_alert_names_its_row(nedc):
@@ -102,7 +111,7 @@ def test_every_kind_of_alert_names_its_row(nedc):
 
     found = by_name(changed(nedc, spoil))
     assert all(alert.found for alert in found.values())
-    assert [name for name, alert in found.items() if not alert.grave] == ["Map edges and limits"]
+    assert [name for name, alert in found.items() if not alert.grave] == [CHECKS[2], CHECKS[3]]
     assert found["Steps not followed"].lines == [
         "B: 2 of 1180 steps, up to 30 Nm short at the wheels (at 7 s, 8 s); driven with what there is."
     ]
@@ -124,7 +133,7 @@ def test_with_a_weight_on_nox_the_sum_is_ranked(nedc):
 
     results = changed(nedc, weigh)
     assert best_rows(results)[0].architecture == "E"
-    first, second = said(results)
+    first, second, _ = said(results)
     assert "fuel plus 20 times NOx" in first and "of that sum" in second
     best, base = best_rows(results)[0], results.rows[0].figures
     percent = 100 * (1 - corrected_cost(best) / corrected_cost(base))
@@ -162,9 +171,9 @@ def test_a_failed_row_raises_an_alert_even_without_its_message(nedc):
 
 
 def test_an_asked_end_charge_is_said_in_verdict_and_notes(nedc):
-    assert len(verdict(nedc.results)) == 2
+    assert len(verdict(nedc.results)) == 3
     results = changed(nedc, lambda contents: contents.update(end_asked={"C2": 0.5, "D": 0.5}))
-    sentence = said(results)[2]
+    sentence = said(results)[3]
     assert "not the start's: 0.5 in C2, D" in sentence and "is not counted as fuel" in sentence
     assert comparison_page(results).count("is not counted as fuel, nor in any change") == 2
 
@@ -197,3 +206,58 @@ def test_no_certificate_is_a_note(nedc):
 def test_a_comparison_without_any_result_says_so():
     empty = SimpleNamespace(rows=[], cars={}, failures={"A": "cannot follow"})
     assert "No case could be solved" in verdict(empty)[0]
+
+
+def test_a_causal_row_that_is_itself_among_the_best_is_said_to_be_so(nedc):
+    def spoil(contents):
+        contents["causal"].append("dp")
+        contents["causal"].append("conventional")
+
+    assert said(changed(nedc, spoil))[2] == (
+        "It is causal: it decides without knowing the rest of the cycle."
+    )
+
+
+def test_the_best_causal_row_is_marked_where_its_charge_is_off(nedc):
+    def spoil(contents):
+        contents["causal"] = ["conventional"]
+        figures(contents, "C2", "conventional")["status"] = "not neutral"
+
+    causal = said(changed(nedc, spoil))[2]
+    assert "is C2 conventional, itself marked not neutral: 3.25" in causal
+    assert causal.endswith("3.1 % above C2 dp.")
+
+    def of_another_car(contents):
+        contents["causal"] = ["nox_cut"]
+        figures(contents, "C2", "nox_cut")["status"] = "shortfall at 2 steps"
+
+    assert said(changed(nedc, of_another_car))[2].endswith(" above the least of E, E dp.")
+    nobody = changed(nedc, lambda contents: contents.update(causal=[]))
+    assert len(verdict(nobody)) == 2
+
+
+def test_short_spells_are_those_within_the_cycle(nedc):
+    def still(contents, *on):
+        """C2 dp with an engine that turns in some steps alone; no other row has a trace that turns."""
+        for row in contents["rows"]:
+            trace = row["detail"]["trace"]
+            is_own = row["figures"]["architecture"] == "C2" and row["figures"]["strategy"] == "dp"
+            steps = range(len(trace["engine_speed_radps"]))
+            trace["engine_speed_radps"] = [100.0 * (is_own and k in on) for k in steps]
+
+    def spells(*on):
+        return by_name(changed(nedc, lambda contents: still(contents, *on)))[CHECKS[3]]
+
+    assert spells(*range(100, 110), 111, *range(115, 130)).lines == [
+        f"C2 dp: {figures(json.loads(nedc.results.model_dump_json()), 'C2', 'dp')['engine_starts']} starts, "
+        "shortest off 1 s, shortest on 1 s."
+    ]
+    # Cut off by the cycle's ends, or long enough.
+    assert not spells(0, *range(3, 1179)).found
+    assert not spells(*range(100, 103)).found
+
+
+def test_words_of_the_trade_are_explained_once_and_text_stays_text():
+    shown = str(explained("<b>causal</b> and causal, over the tabulated controls"))
+    assert shown.count("<abbr") == 2 and shown.startswith("&lt;b&gt;<abbr")
+    assert str(explained("noncausal")) == "noncausal"
