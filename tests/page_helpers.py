@@ -22,7 +22,8 @@ FLAGS = [
 # However busy the machine; what comes at all comes within seconds on an idle one.
 PATIENCE_S = 300.0
 
-AXES = """() => [...document.querySelectorAll('.plot')].flatMap(plot => Object.entries(plot._fullLayout)
+AXES = """() => [...document.querySelectorAll('.plot')]
+  .filter(plot => plot.offsetParent).flatMap(plot => Object.entries(plot._fullLayout)
   .filter(([name]) => /^[xy]axis[0-9]*$/.test(name) && plot._fullLayout._plots)
   .filter(() => (plot._fullData || []).some(trace => trace.type !== 'sankey'))
   .map(([name, axis]) => [plot.id, name, axis.title.text || '']))"""
@@ -61,7 +62,9 @@ class Made:
 class Opened:
     """A page in the browser, with what it asked for and what went wrong."""
 
-    def __init__(self, browser, path: Path, *, wait: bool = True, script: str = "", **settings):
+    def __init__(
+        self, browser, path: Path, *, at: str = "", wait: bool = True, script: str = "", **settings
+    ):
         self.context = browser.new_context(accept_downloads=True, **settings)
         self.context.set_default_timeout(1000 * PATIENCE_S)
         self.page = self.context.new_page()
@@ -71,7 +74,7 @@ class Opened:
         self.page.on("request", lambda request: self.requests.append(request.url))
         if script:
             self.page.add_init_script(script)
-        self.page.goto(path.as_uri())
+        self.page.goto(path.as_uri() + (f"#{at}" if at else ""))
         if wait:
             self.page.wait_for_selector("html[data-drawn]", state="attached", timeout=120_000)
 

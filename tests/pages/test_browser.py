@@ -177,7 +177,7 @@ def test_without_scripts_verdict_and_tables_are_there_and_figures_say_what_is_mi
     assert "proven lower bound" in page.locator(".verdict").inner_text()
     assert page.locator("#comparison tbody tr").count() == 20
     assert page.locator("table.balance:visible").count() == 20
-    assert page.locator(".missing:visible").count() == page.locator(".plot").count() > 8
+    assert page.locator(".missing:visible").count() == page.locator(".plot:visible").count() > 8
     assert page.locator("#download:visible, #row:visible").count() == 0
 
 
@@ -226,7 +226,12 @@ def test_names_from_files_stay_text(nedc, opened, tmp_path):
 
 
 def test_what_was_not_asked_for_is_said_and_a_wide_figure_says_to_scroll(nedc, opened):
-    page = opened(nedc.path, viewport={"width": 400, "height": 800}).page
+    at = "row=C2+conventional&over=C2+dp&from=100&to=200"
+    page = opened(nedc.path, at=at, viewport={"width": 400, "height": 800}).page
+    # A link to two rows and a window opens them.
+    assert page.locator("#h-row .chosen-name").inner_text() == "C2 conventional"
+    assert page.locator("#over option:checked").inner_text() == "C2 dp"
+    assert [page.input_value(end) for end in ("#from", "#to")] == ["100", "200"]
     said = page.locator("#left-out").inner_text()
     assert "--fronts" in said and "--sensitivity" in said
     assert page.locator("#h-calibration").inner_text() == "Calibration of the rules"

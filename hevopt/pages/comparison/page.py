@@ -22,7 +22,13 @@ def comparison_page(results: Results) -> str:
     studies = [("Calibration of the rules", calibrated), ("Sensitivity", results.sensitivity)]
     return render(
         "comparison.html.j2",
-        ("comparison_rows.js", "comparison_row.js", "comparison.js"),
+        (
+            "comparison_rows.js",
+            "comparison_over.js",
+            "comparison_row.js",
+            "comparison_flow.js",
+            "comparison.js",
+        ),
         results.packed(),
         results=results,
         title=f"Comparison on {results.cycle}",

@@ -1,6 +1,7 @@
 """Reading a saved comparison: unpacked within bounds, and checked before anything is drawn from it."""
 
 import zlib
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -71,8 +72,14 @@ def _faults_of_car(name: str, car: CarFigures) -> list[str]:
     for key in _OVER_TIME:
         if len(getattr(car, key)) != steps or not steps:
             faults.append(f"cars.{name}.{key}: not of {steps} steps, or of none")
-    if car.about is not None and len(car.about.braking_mps) != len(car.about.braking_share):
-        faults.append(f"cars.{name}.about: not as many speeds as shares of braking")
+    if car.about is not None:
+        about = car.about
+        if len(about.braking_mps) != len(about.braking_share):
+            faults.append(f"cars.{name}.about: not as many speeds as shares of braking")
+        points = len(about.battery_soc)
+        rising = all(low < high for low, high in pairwise(about.battery_soc))
+        if points < 2 or points != len(about.battery_v) or not rising:
+            faults.append(f"cars.{name}.about: no curve of the battery's voltage over rising SOC")
     for key, drawn in (("engine", car.engine), ("machine", car.machine)):
         speeds, torques = len(drawn.speed_radps), len(drawn.torque_nm)
         over_speed = [

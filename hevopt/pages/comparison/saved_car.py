@@ -56,6 +56,7 @@ class CarAbout(FileModel):
 
     engine_shaft: None without an engine; parts: of the driveline, the road's shaft being "wheel"
     battery_j, window_j: stored between the ends of the battery's curves, and of the window
+    battery_soc, battery_v: open-circuit voltage, linear between points; capacity_as: what makes them energy
     gears: where the gears of a step come from; shift_gap_s: time without torque at a change, None without a gearbox
     braking_mps, braking_share: share of the braking that the machine may take over speed; empty where all it can
     """
@@ -70,6 +71,9 @@ class CarAbout(FileModel):
     parts: list[PartAbout] = Field(max_length=_PARTS_MAX)
     battery_j: Number
     window_j: Number
+    battery_soc: list[Number]
+    battery_v: list[Number]
+    capacity_as: Number
     functions: list[str]
     gears: GearSource
     shift_gap_s: Number | None

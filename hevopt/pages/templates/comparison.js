@@ -8,7 +8,7 @@
 
   // Choosing a row and a window ---------------------------------------------------------------------------------------
 
-  const DETAIL = ["traces", "engine-efficiency", "engine-nox", "machine-map", "sankey", "spells"];
+  const DETAIL = ["traces", "engine-efficiency", "engine-nox", "machine-map", "sankey", "flow-apart", "spells"];
   const MAPS = ["engine-efficiency", "engine-nox", "machine-map"];
 
   function choose(index) {
@@ -19,9 +19,28 @@
     for (const block of document.querySelectorAll("[data-row]")) block.hidden = block.dataset.row !== `${f.architecture}|${f.strategy}`;
     for (const line of byId("comparison").tBodies[0].rows) line.classList.toggle("chosen", line.dataset.index === String(index));
     byId("row-facts").textContent = `${fixed(f.fuel_l_per_100km, 3)} l/100 km · NOx ${f.nox_mg_per_km === null ? "unknown" : `${fixed(f.nox_mg_per_km, 0)} mg/km`} · ${f.gap_percent === null ? "no bound" : `${fixed(f.gap_percent, 3)} % above the bound`} · ${f.status}`;
+    if (Shown.over === index) Shown.over = -1;
     showWindow();
+    showOther();
     DETAIL.forEach(draw);
     Page.say(`showing ${nameOf(row)}`);
+  }
+
+  function lay(index) {
+    Shown.over = index === Shown.chosen ? -1 : index;
+    showOther();
+    DETAIL.forEach(draw);
+    Over.write();
+    Page.say(Shown.over < 0 ? "one row alone" : `${nameOf(Shown.results.rows[Shown.over])} laid under it`);
+  }
+
+  function showOther() {
+    const excess = Over.excessG();
+    byId("over").value = String(Shown.over);
+    byId("over-facts").textContent = Over.facts(excess);
+    byId("worst").hidden = !excess;
+    byId("figure-flow-apart").hidden = Shown.over < 0;
+    byId("optimum").hidden = Over.optimum() === Shown.chosen;
   }
 
   function limits() {
@@ -42,13 +61,37 @@
     showWindow();
     if (redraw) draw("traces");
     MAPS.forEach(draw);
+    Over.write();
+  }
+
+  function pick(index) {
+    choose(index);
+    Over.write();
+  }
+
+  // Show what the address asks for; whether it asks for anything.
+  function follows() {
+    const asked = Over.read();
+    if (!asked) return false;
+    Shown.over = asked.over === asked.row ? -1 : asked.over;
+    Shown.view = asked.view;
+    choose(asked.row);
+    byId("row-section").scrollIntoView();
+    return true;
   }
 
   function controls() {
-    byId("row").addEventListener("change", (event) => choose(Number(event.target.value)));
+    byId("row").addEventListener("change", (event) => pick(Number(event.target.value)));
+    byId("over").addEventListener("change", (event) => lay(Number(event.target.value)));
+    byId("optimum").addEventListener("click", () => lay(Over.optimum()));
+    byId("worst").addEventListener("click", () => {
+      const { from, to } = Over.worst(Over.excessG());
+      setView([from, to], true);
+    });
+    addEventListener("hashchange", follows);
     for (const button of document.querySelectorAll("button.choose")) {
       button.addEventListener("click", () => {
-        choose(Number(button.dataset.index));
+        pick(Number(button.dataset.index));
         byId("row-section").scrollIntoView();
         byId("row").focus({ preventScroll: true });
       });
@@ -89,7 +132,8 @@
       figure("engine-efficiency", own.engineEfficiency);
       figure("engine-nox", own.engineNox);
       figure("machine-map", own.machineMap);
-      figure("sankey", own.sankey);
+      figure("sankey", Flow.sankey);
+      figure("flow-apart", Flow.differences);
       figure("shares", AllRows.shares);
       figure("spells", own.spells);
     }
@@ -112,7 +156,7 @@
     register();
     if (byId("row")) {
       controls();
-      choose(Number(byId("row").value));
+      if (!follows()) choose(Number(byId("row").value));
     }
   });
 })();

@@ -1,10 +1,10 @@
 "use strict";
-// The figures of the row shown in detail: traces, operating points, energy flow, spells of the engine.
+// The figures of the row shown in detail: traces, operating points, spells of the engine; another laid under it.
 
 // onZoom: what to do when the traces were zoomed, by the library's event
 const OneRow = (onZoom) => {
   const { plain, axis, layout } = Page;
-  const { narrow, fixed } = Look;
+  const { narrow, fixed, nameOf } = Look;
   const RPM = 30 / Math.PI;
   // Modes of operation as an axis has room for them; the names in full are in the data.
   const SHORT = ["stop, off", "stop, on", "recover", "brake", "electric", "engine", "assist", "charge"];
@@ -13,8 +13,8 @@ const OneRow = (onZoom) => {
 
   // Traces --------------------------------------------------------------------------------------------------------
 
-  function panels(look) {
-    const c = car(), t = Shown.results.rows[Shown.chosen].detail.trace, colour = look.colours;
+  function panels(look, n) {
+    const c = Over.carOf(n), t = Shown.results.rows[n].detail.trace, colour = look.colours;
     const end = c.time_s[c.time_s.length - 1] + c.step_s[c.step_s.length - 1];
     const edges = [...c.time_s, end];
     const held = (values) => [...values, values[values.length - 1]];
@@ -25,7 +25,7 @@ const OneRow = (onZoom) => {
     if (t.machine_gear.some((gear) => gear > 0)) gears.push(step("machine gear", t.machine_gear, { digits: 0, line: { color: colour[1], dash: "dot", width: 1.8 } }));
     const level = (name, value) => ({ name, x: [edges[0], end], y: [100 * value, 100 * value], line: { width: 1, dash: "dot", color: look.muted }, silent: true });
     return [
-      { share: 1.1, title: "speed<br>(km/h)", lines: [step("speed", c.speed_mps.map((v) => v * 3.6), { unit: " km/h" })] },
+      { share: 1.1, title: "speed<br>(km/h)", lines: [step("speed", c.speed_mps.map((v) => v * 3.6), { unit: " km/h", trace: { ofCycle: true } })] },
       { share: 0.8, title: "gear<br>(–)", lines: gears, axis: { rangemode: "tozero", dtick: 2 } },
       { share: 1.35, title: "mode", lines: [step("mode", t.operation, { line: { color: look.ink, width: 1.1 }, trace: { text: held(t.operation).map((n) => plain(Shown.results.operations[n])), words: true } })],
         axis: { tickvals: SHORT.map((_, n) => n), ticktext: SHORT, range: [-0.6, SHORT.length - 0.4], tickfont: { size: 10 } } },
@@ -38,8 +38,21 @@ const OneRow = (onZoom) => {
     ];
   }
 
+  // The lines of the other row: pale where lines have colours of their own, else in one colour, thin.
+  function under(look, parts) {
+    const other = plain(nameOf(Shown.results.rows[Shown.over]));
+    panels(look, Shown.over).forEach((part, n) => {
+      const own = part.lines.filter((line) => !line.silent && !line.ofCycle);
+      parts[n].lines.unshift(...own.map((line) => ({ ...line, name: `${line.name}, ${other}`, pale: part.legend,
+        line: part.legend ? { ...line.line, width: 1 } : { ...line.line, color: look.colours[6], width: 1, dash: "solid" } })));
+    });
+    const excess = Over.excessG();
+    if (excess) parts.push({ share: 1.5, title: "excess<br>cost (g)", marked: Over.worst(excess), lines: [{ name: "excess cost", x: parts[0].lines[0].x, y: excess, line: { width: 1.6, color: look.colours[1] }, unit: " g", digits: 2 }] });
+    return parts;
+  }
+
   function traces(look, width) {
-    const parts = panels(look), gap = 0.022, forLegend = narrow(width) ? 0.036 : 0.014;
+    const parts = Shown.over < 0 ? panels(look, Shown.chosen) : under(look, panels(look, Shown.chosen)), gap = 0.022, forLegend = narrow(width) ? 0.036 : 0.014;
     const whole = parts.reduce((sum, part) => sum + part.share, 0), room = 1 - gap * (parts.length - 1) - forLegend;
     const data = [], axes = {};
     let top = 1;
@@ -49,23 +62,26 @@ const OneRow = (onZoom) => {
       const domain = [Math.max(0, top - height), top];
       axes[`yaxis${key}`] = axis(look, part.title, { domain, fixedrange: true, automargin: false, zeroline: true, nticks: 6, ...part.axis, title: { text: part.title, font: { size: 11 }, standoff: 4 } });
       if (part.legend) axes.legend = { orientation: "h", x: 0, xanchor: "left", y: domain[1], yanchor: "bottom", font: { size: 11 }, bgcolor: "rgba(0,0,0,0)" };
+      if (part.marked) axes.marked = { from: part.marked.from, to: part.marked.to, domain };
       for (const line of part.lines) {
-        data.push({ type: "scatter", mode: "lines", name: line.name, x: line.x, y: line.y, line: line.line, xaxis: "x", yaxis: `y${key}`, showlegend: Boolean(part.legend),
+        data.push({ type: "scatter", mode: "lines", name: line.name, x: line.x, y: line.y, line: line.line, xaxis: "x", yaxis: `y${key}`, showlegend: Boolean(part.legend) && !line.pale, opacity: line.pale ? 0.45 : 1,
           ...(line.silent ? { hoverinfo: "skip" } : line.words ? { text: line.text, hovertemplate: "%{text}" } : { hovertemplate: `%{y:.${line.digits}f}${line.unit}` }) });
       }
       top -= height + gap;
     });
-    const last = `y${parts.length}`, x = data[0].x;
-    return { data, on: { plotly_relayout: onZoom }, layout: layout(look, width, {
-      ...axes, hovermode: narrow(width) ? "closest" : "x unified", hoversubplots: "axis", dragmode: "zoom",
+    const last = `y${parts.length}`, x = data[0].x, { marked, ...drawn } = axes;
+    return { data, height: Shown.over < 0 ? undefined : 1340, on: { plotly_relayout: onZoom }, layout: layout(look, width, {
+      ...drawn, hovermode: narrow(width) ? "closest" : "x unified", hoversubplots: "axis", dragmode: "zoom",
       xaxis: axis(look, "time (s)", { anchor: last, range: Shown.view ?? [x[0], x[x.length - 1]], zeroline: false, unifiedhovertitle: { text: "%{x:.1f} s" } }),
       margin: { l: narrow(width) ? 72 : 84, r: 12, t: 8, b: 44 },
-      shapes: parts.slice(1).map((part, n) => {
+      shapes: [...(marked ? [worstShape(look, marked)] : []), ...parts.slice(1).map((part, n) => {
         const y = axes[`yaxis${n === 0 ? "" : n + 1}`].domain[0] - gap / 2;
         return { type: "line", xref: "paper", yref: "paper", x0: 0, x1: 1, y0: y, y1: y, line: { color: look.rule, width: 1 } };
-      }),
+      })],
     }) };
   }
+
+  const worstShape = (look, { from, to, domain }) => ({ type: "rect", xref: "x", yref: "paper", x0: from, x1: to, y0: domain[0], y1: domain[1], layer: "below", line: { width: 0 }, fillcolor: look.colours[1], opacity: 0.22 });
 
   // Operating points ------------------------------------------------------------------------------------------------
 
@@ -84,13 +100,21 @@ const OneRow = (onZoom) => {
     return [...found.values()].map((cell) => ({ ...cell, x: cell.x / cell.weight, y: cell.y / cell.weight })).sort((a, b) => b.weight - a.weight);
   }
 
-  function pointTrace(look, found, unit, scale, colour, width) {
-    const most = Math.max(...found.map((cell) => cell.weight), 1e-12), all = found.reduce((sum, cell) => sum + cell.weight, 0);
+  // most: the largest weight of all rows drawn, so that areas compare; hollow: of the row that lies under
+  function pointTrace(look, found, most, unit, scale, colour, width, hollow) {
+    const all = found.reduce((sum, cell) => sum + cell.weight, 0);
     const largest = narrow(width) ? 22 : 26;
-    return { type: "scatter", mode: "markers", name: "operating points", x: found.map((c) => c.x), y: found.map((c) => c.y),
-      marker: { size: found.map((c) => c.weight), sizemode: "area", sizeref: 2 * most / largest ** 2, sizemin: 1.6, color: colour, opacity: 0.62, line: { color: look.paper, width: 0.7 } },
+    return { type: "scatter", mode: "markers", name: hollow ? "operating points of the other row" : "operating points", x: found.map((c) => c.x), y: found.map((c) => c.y),
+      marker: { symbol: hollow ? "circle-open" : "circle", size: found.map((c) => c.weight), sizemode: "area", sizeref: 2 * most / largest ** 2, sizemin: 1.6, color: colour, opacity: hollow ? 0.9 : 0.62, line: hollow ? { width: 1.3 } : { color: look.paper, width: 0.7 } },
       customdata: found.map((c) => [c.weight * scale, 100 * c.weight / all, c.time]),
       hovertemplate: `%{x:.0f} rpm, %{y:.1f} Nm<br>%{customdata[0]:.3g} ${unit} (%{customdata[1]:.1f} %)<br>%{customdata[2]:.0f} s<extra></extra>`, showlegend: false };
+  }
+
+  // The points of the row shown, before them those of the row under it. of: index of a row -> its cells
+  function pointTraces(look, of, unit, scale, colour, width) {
+    const rows = Shown.over < 0 ? [Shown.chosen] : [Shown.over, Shown.chosen], found = rows.map(of);
+    const most = Math.max(...found.flat().map((cell) => cell.weight), 1e-12);
+    return rows.map((n, at) => pointTrace(look, found[at], most, unit, scale, n === Shown.chosen ? colour : look.colours[6], width, n !== Shown.chosen));
   }
 
   function contours(look, map, values, factor, levels, dash) {
@@ -115,8 +139,8 @@ const OneRow = (onZoom) => {
 
   const weightChosen = () => document.querySelector("input[name=weight]:checked")?.value ?? "fuel";
 
-  function weightsOf(kind, torque, speed) {
-    const c = car(), t = Shown.results.rows[Shown.chosen].detail.trace;
+  function weightsOf(kind, n, torque, speed) {
+    const c = Over.carOf(n), t = Shown.results.rows[n].detail.trace;
     if (kind === "fuel") return { weights: t.fuel_kg, unit: "g", scale: 1e3 };
     if (kind === "time") return { weights: c.step_s, unit: "s", scale: 1 };
     return { weights: torque.map((nm, k) => Math.abs(nm * speed[k]) * c.step_s[k]), unit: "kJ", scale: 1e-3 };
@@ -124,15 +148,19 @@ const OneRow = (onZoom) => {
 
   function engineMap(values, factor, levels, colour) {
     return (look, width) => {
-      const map = car().engine, t = Shown.results.rows[Shown.chosen].detail.trace, { weights, unit, scale } = weightsOf(weightChosen(), t.engine_torque_nm, t.engine_speed_radps);
+      const map = car().engine;
       // At rest the engine is no point of its map.
-      const turning = weights.map((w, k) => (t.engine_speed_radps[k] > 0 ? w : 0));
+      const of = (n) => {
+        const t = Shown.results.rows[n].detail.trace, { weights } = weightsOf(weightChosen(), n, t.engine_torque_nm, t.engine_speed_radps);
+        return cells(t.engine_speed_radps, t.engine_torque_nm, weights.map((w, k) => (t.engine_speed_radps[k] > 0 ? w : 0)), CELL_RPM, CELL_NM);
+      };
       const xs = map.speed_radps.map((w) => w * RPM), top = 1.08 * Math.max(...map.limit_nm), bottom = 1.25 * Math.min(...map.least_nm, -5);
       const shown = values(map), data = [];
       const steps = shown && levels(shown, factor);
       if (steps) data.push(contours(look, map, shown, factor, steps, "solid"));
       data.push(beyond(look, xs, map.limit_nm, top * 1.02), curve(look, xs, map.limit_nm, "solid"), curve(look, xs, map.least_nm, "dash", 1.2));
-      data.push(pointTrace(look, cells(t.engine_speed_radps, t.engine_torque_nm, turning, CELL_RPM, CELL_NM), unit, scale, look.colours[colour], width));
+      const { unit, scale } = weightsOf(weightChosen(), Shown.chosen, [], []);
+      data.push(...pointTraces(look, of, unit, scale, look.colours[colour], width));
       return { data, layout: layout(look, width, {
         xaxis: axis(look, "engine speed (rpm)", { range: [0.92 * xs[0], 1.01 * xs[xs.length - 1]], zeroline: false, nticks: 7 }),
         yaxis: axis(look, "engine torque (Nm)", { range: [bottom, top], zeroline: true }), margin: { l: 56, r: 12, t: 8, b: 44 }, hovermode: "closest",
@@ -141,14 +169,18 @@ const OneRow = (onZoom) => {
   }
 
   function machineMap(look, width) {
-    const map = car().machine, t = Shown.results.rows[Shown.chosen].detail.trace, kind = weightChosen() === "time" ? "time" : "energy";
-    const { weights, unit, scale } = weightsOf(kind, t.machine_torque_nm, t.machine_speed_radps);
+    const map = car().machine, kind = weightChosen() === "time" ? "time" : "energy";
     const xs = map.speed_radps.map((w) => w * RPM), edge = 1.1 * Math.max(...map.torque_nm);
     const data = [], levels = levelsOf(map.efficiency, 100, 9);
     if (levels) data.push(contours(look, map, map.efficiency, 100, { ...levels, start: Math.max(levels.start, 50) }, "solid"));
     data.push(beyond(look, xs, map.limit_nm, 3 * edge), beyond(look, xs, map.least_nm, -3 * edge), curve(look, xs, map.limit_nm, "solid"), curve(look, xs, map.least_nm, "solid"));
     const wide = Math.max(CELL_RPM, xs[xs.length - 1] / 100), high = Math.max(0.05, edge / 50);
-    data.push(pointTrace(look, cells(t.machine_speed_radps, t.machine_torque_nm, weights, wide, high), unit, scale, look.colours[5], width));
+    const { unit, scale } = weightsOf(kind, Shown.chosen, [], []);
+    const of = (n) => {
+      const t = Shown.results.rows[n].detail.trace;
+      return cells(t.machine_speed_radps, t.machine_torque_nm, weightsOf(kind, n, t.machine_torque_nm, t.machine_speed_radps).weights, wide, high);
+    };
+    data.push(...pointTraces(look, of, unit, scale, look.colours[5], width));
     const flat = levels ? [] : [{ xref: "paper", yref: "paper", x: 0.5, y: 0.98, showarrow: false, text: flatText(map), font: { size: 11, color: look.muted } }];
     return { data, layout: layout(look, width, {
       xaxis: axis(look, "machine speed (rpm)", { range: [0, 1.01 * xs[xs.length - 1]], zeroline: false, nticks: 7 }),
@@ -161,46 +193,7 @@ const OneRow = (onZoom) => {
     return value === undefined ? "no map" : `one efficiency: ${fixed(100 * value, 1)} %`;
   }
 
-  // Energy flow -----------------------------------------------------------------------------------------------------
-
-  const HUES = { Fuel: 1, Engine: 2, Motor: 5, Generator: 5, "Battery, drawn": 3, "Battery, stored": 3 };
-  const KEPT = ["Road load", "Battery, stored"];
-
-  // The library lets a label to the right of its place run into one to the left of the next: the lower moves down.
-  function apart(element) {
-    const placed = [];
-    const labels = [...element.querySelectorAll(".node-label")].map((label) => ({ label, box: label.getBoundingClientRect() }));
-    for (const { label, box } of labels.sort((a, b) => a.box.top - b.box.top)) {
-      let top = box.top;
-      for (const other of placed) {
-        if (box.left < other.right && other.left < box.right && top < other.bottom && other.top < top + box.height) top = other.bottom;
-      }
-      placed.push({ left: box.left, right: box.right, top, bottom: top + box.height });
-      placed.sort((a, b) => a.top - b.top);
-      if (top > box.top) label.style.translate = `0 ${(top - box.top) / label.getScreenCTM().a}px`;
-    }
-  }
-
-  function sankey(look, width) {
-    const { links, residual_j } = Shown.results.rows[Shown.chosen].detail.energy;
-    const places = [...new Set(links.flatMap((link) => [link.source, link.target]))];
-    const through = (place, end) => links.filter((l) => l[end] === place).reduce((sum, l) => sum + l.energy_j, 0);
-    const size = (place) => Math.max(through(place, "source"), through(place, "target")) / 1e3;
-    const ends = (place) => !links.some((link) => link.source === place);
-    const hue = (place) => look.colours[HUES[place] ?? (ends(place) && !KEPT.includes(place) ? 0 : 4)];
-    const label = (place) => `${place} ${fixed(size(place), size(place) < 10 ? 1 : 0)} kJ`;
-    return {
-      least: 960, fresh: true, after: apart,
-      data: [{
-        type: "sankey", arrangement: "snap", valueformat: ",.1f", valuesuffix: " kJ", textfont: { size: 11, color: look.ink, shadow: "none" },
-        node: { label: places.map(label), color: places.map(hue), customdata: places, pad: 26, thickness: 14, line: { color: look.ink, width: 0.5 }, hovertemplate: "%{customdata}: %{value}<extra></extra>" },
-        link: { source: links.map((l) => places.indexOf(l.source)), target: links.map((l) => places.indexOf(l.target)), value: links.map((l) => l.energy_j / 1e3),
-          color: links.map((l) => `${hue(ends(l.target) ? l.target : l.source)}66`), hovertemplate: "%{source.customdata} → %{target.customdata}<br>%{value}<extra></extra>" },
-      }],
-      layout: layout(look, width, { margin: { l: 6, r: 6, t: 14, b: 26 },
-        annotations: [{ xref: "paper", yref: "paper", x: 0, y: 0, yshift: -16, yanchor: "middle", showarrow: false, text: `residual of the balance: ${residual_j === 0 ? "0" : (residual_j / 1e3).toExponential(1).replace(/-/g, "−")} kJ`, font: { size: 11, color: look.muted } }] }),
-    };
-  }
+  // Spells ----------------------------------------------------------------------------------------------------------
 
   function spells(look, width) {
     const detail = Shown.results.rows[Shown.chosen].detail, ends = [2, 5, 10, 20, 50, 100, 200, Infinity];
@@ -219,7 +212,7 @@ const OneRow = (onZoom) => {
   }
 
   return {
-    traces, machineMap, sankey, spells, car,
+    traces, machineMap, spells, car,
     engineEfficiency: engineMap((map) => map.efficiency, 100, efficiencyLevels, 1),
     engineNox: engineMap((map) => map.nox_kgpj, 3.6e9, (values, factor) => levelsOf(values, factor, 8), 1),
   };

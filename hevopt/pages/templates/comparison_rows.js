@@ -1,8 +1,9 @@
 "use strict";
 // What a comparison shows, and its figures over all rows. Data are in SI; units change here, where they are drawn.
 
-// The data; names of strategies in the order of legends; index of the row shown in detail; its time window, or null.
-const Shown = { results: null, names: [], chosen: -1, view: null };
+// The data; names of strategies in the order of legends; index of the row shown in detail, and of the one laid under
+// it or -1; their time window, or null.
+const Shown = { results: null, names: [], chosen: -1, over: -1, view: null };
 
 const Look = (() => {
   const short = (name) => (name.length > 14 ? `${name.slice(0, 13)}…` : name);

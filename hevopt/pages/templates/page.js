@@ -57,7 +57,7 @@ const Page = (() => {
     };
   }
 
-  // build(look, width) -> { data, layout, height?, least?, on?, fresh?, after? }
+  // build(look, width) -> { data, layout, height?, least?, on?, fresh?, after? }, or null where there is nothing to draw
   // least: width below which the figure scrolls in its box, and on paper is scaled down; on: event of the library ->
   // what to do; fresh: drawn anew each time, for a figure that would glide into place and be printed on its way; after: what to do with the drawn
   function draw(id) {
@@ -66,7 +66,9 @@ const Page = (() => {
     // A4 within its margins, in CSS pixels.
     const inMaps = element.closest(".maps") !== null;
     const room = onPaper ? (inMaps ? 340 : 690) : element.clientWidth;
-    const made = build(theme(), room), width = Math.max(room, made.least ?? 0);
+    const made = build(theme(), room);
+    if (!made) return;
+    const width = Math.max(room, made.least ?? 0);
     const most = onPaper ? (inMaps ? 310 : 880) : Infinity, height = Math.min(most, made.height || Number(element.dataset.height));
     const config = { displaylogo: false, displayModeBar: "hover", staticPlot: onPaper, showTips: false, showSendToCloud: false, plotlyServerURL: "",
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };

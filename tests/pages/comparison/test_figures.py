@@ -58,10 +58,11 @@ def test_on_paper_every_figure_is_drawn_light_and_within_the_page(shown):
     page.emulate_media(media="print", color_scheme="dark")
     settle(page)
     page.wait_for_function(
-        "[...document.querySelectorAll('.plot')].every(p => /^#f+$/.test(p._fullLayout.paper_bgcolor))"
+        "[...document.querySelectorAll('figure:not([hidden]) .plot')]"
+        ".every(p => /^#f+$/.test(p._fullLayout.paper_bgcolor))"
     )
     looks = page.evaluate(
-        "[...document.querySelectorAll('.plot')].map(p => "
+        "[...document.querySelectorAll('figure:not([hidden]) .plot')].map(p => "
         "[p.querySelector('.main-svg').getBoundingClientRect().width, p._fullLayout.paper_bgcolor])"
     )
     assert len(looks) >= 11
@@ -75,10 +76,23 @@ def test_on_paper_every_figure_is_drawn_light_and_within_the_page(shown):
 
 
 OVERLAPS = """() => {
-  const labels = [...document.querySelectorAll('#sankey .node-label')]
-    .map(e => [e.textContent, e.getBoundingClientRect()]);
+  const drawn = [...document.querySelectorAll('#sankey .flow-label')];
+  const labels = drawn.map(e => [e.textContent, e.getBoundingClientRect()]);
+  const boxes = drawn.map(e => e.getBBox());
+  const crossed = new Set();
+  for (const link of document.querySelectorAll('#sankey .sankey-link')) {
+    const length = link.getTotalLength();
+    for (let at = 0; at < length; at += 4) {
+      const { x, y } = link.getPointAtLength(at);
+      const over = b => x > b.x && x < b.x + b.width && y > b.y && y < b.y + b.height;
+      boxes.forEach((b, n) => { if (over(b)) crossed.add(n); });
+    }
+  }
   const room = document.querySelector('#sankey .main-svg').getBoundingClientRect();
+  const count = document.querySelectorAll('#sankey .sankey-node').length;
+  if (labels.length !== count || !count) return [['labels', labels.length, count]];
   return labels.flatMap(([name, a], n) => [
+    ...(crossed.has(n) ? [[name, 'crossed']] : []),
     ...(a.left < room.left || a.right > room.right || a.bottom > room.bottom ? [[name, 'cut']] : []),
     ...labels.slice(0, n).filter(([, b]) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
       && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1).map(([other]) => [name, other])]);
@@ -86,13 +100,13 @@ OVERLAPS = """() => {
 
 
 @pytest.mark.parametrize("media", ["screen", "print"])
-def test_labels_of_the_energy_flow_are_apart_in_every_row(nedc, shown, media):
+def test_labels_of_the_energy_flow_are_apart_and_crossed_by_no_line(nedc, shown, media):
     page = shown.page
     page.emulate_media(media=media)
     settle(page)
     # On paper, where the flow is as wide in every row, the last one of each car.
     last = {row.figures.architecture: n for n, row in enumerate(nedc.results.rows)}
-    for n in range(len(nedc.results.rows)) if media == "screen" else last.values():
+    for n in range(0, len(nedc.results.rows), 3) if media == "screen" else last.values():
         # What is not on paper cannot be chosen by hand.
         choose = "(s, n) => { s.value = n; s.dispatchEvent(new Event('change')); }"
         page.locator("#row").evaluate(choose, str(n))
