@@ -19,6 +19,7 @@ class Vehicle(Shown):
     rolling_n, air_n: (4,) forces on a level road as polynomials of speed, r0 + r1 v + r2 v² + r3 v³ (N, m/s); of
     these the rolling resistance scales with the cosine of the slope
     braking: what the machine may take of it; None: all that machine and battery can
+    auxiliary_off_power_w: electric load while the engine is at rest; None: the same as while it turns
     """
 
     name: str
@@ -29,6 +30,12 @@ class Vehicle(Shown):
     rolling_n: tuple[float, float, float, float]
     air_n: tuple[float, float, float, float]
     braking: Braking | None = None
+    auxiliary_off_power_w: float | None = None
+
+    def load_w(self, *, engine_on: bool) -> float:
+        """Electric load, engine turning or at rest."""
+        off_w = self.auxiliary_off_power_w
+        return self.auxiliary_power_w if engine_on or off_w is None else off_w
 
     @property
     def equivalent_mass_kg(self) -> float:

@@ -77,6 +77,8 @@ class BatteryFile(FileModel):
     coulombic_efficiency: Fraction = 1.0
     power_max_w: Positive | None = None
     current_max_a: Positive | None = None
+    voltage_min_v: NotNegative = 0.0
+    voltage_max_v: Positive | None = None
     mass_kgpkwh: Specific | None = None
     price_pkwh: Specific | None = None
     scale: BatteryScaleFile | None = None

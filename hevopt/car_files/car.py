@@ -80,5 +80,6 @@ class CarFile(FileModel):
     tyre_radius_m: Annotated[float, Field(ge=0.1, le=1.5)]
     wheel_inertia_kgm2: Annotated[float, Field(ge=0, le=1000)]
     auxiliary_power_w: AuxiliaryPower
+    auxiliary_off_power_w: AuxiliaryPower | None = None
     road_load: RoadLoadFile
     braking: BrakingFile | None = None

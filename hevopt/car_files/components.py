@@ -56,6 +56,7 @@ def vehicle_of(car: CarFile, hybrid_mass_kg: float) -> Vehicle:
         rolling,
         air,
         None if car.braking is None else _braking(car.braking),
+        car.auxiliary_off_power_w,
     )
 
 
@@ -184,9 +185,11 @@ def battery_of(data: BatteryFile) -> Battery:
     )
     power_max_w = (data.power_max_w or inf) * cells * size
     current_max_a = (data.current_max_a or inf) * size
+    voltage_max_v = (data.voltage_max_v or inf) * cells
     return Battery(
         points, np.array(voltage) * cells, discharge, charge,
         data.capacity_ah * TO_SI["_ah"][1] * size, data.coulombic_efficiency,
         data.soc.min, data.soc.max,
         power_max_w, power_max_w, current_max_a, current_max_a,
+        data.voltage_min_v * cells, voltage_max_v,
     )  # fmt: skip

@@ -76,7 +76,9 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "mass_kg": ("kg", "mass as driven, without the parts that an architecture adds"),
         "tyre_radius_m": ("m", "rolling radius of the driven wheels"),
         "wheel_inertia_kgm2": ("kg m²", "moment of inertia of all wheels together"),
-        "auxiliary_power_w": ("W", "electric load of the on-board network, constant"),
+        "auxiliary_power_w": ("W", "electric load of the on-board network, constant; that of a cycle that lists "
+                              "one, auxiliary_power_w, goes before"),
+        "auxiliary_off_power_w": ("W", "the same while the engine is at rest; without it as while it turns"),
         "road_load": ("", "rolling and air resistance in parts, or coast-down coefficients"),
         "braking": ("", "how much of the braking a machine may take; without it all that it can"),
     },
@@ -229,6 +231,8 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "coulombic_efficiency": ("-", "share of the charging current that is stored"),
         "power_max_w": ("W", "highest power of a cell, either direction; without it voltage and current limit"),
         "current_max_a": ("A", "highest current, either direction"),
+        "voltage_min_v": ("V", "lowest voltage of a cell at its terminals, while it discharges"),
+        "voltage_max_v": ("V", "highest voltage of a cell at its terminals, while it charges; without it none"),
         "mass_kgpkwh": ("kg/kWh", "mass of the pack per energy from state of charge 0 to 1: what the car gains or "
                         "loses where another size is asked for"),
         "price_pkwh": ("1/kWh", "price per that energy, in any currency that engine and machine share"),

@@ -19,6 +19,7 @@ from tomlkit.exceptions import TOMLKitError
 from hevopt.car_files import schema as file_schema
 from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, load_architecture
 from hevopt.car_files.meanings import MEANINGS
+from hevopt.car_files.written_out import written_out
 from hevopt.errors import DataError, unknown_name
 from hevopt.files.lookup import grouped_names, read_text, shipped_folder, shipped_names
 from hevopt.files.shown import printable, shown
@@ -44,18 +45,27 @@ class Notes(NamedTuple):
 
 
 def new_files(
-    name: str, like: str | Path, out: Path | None = None, components: Sequence[str] = ()
+    name: str,
+    like: str | Path,
+    out: Path | None = None,
+    components: Sequence[str] = (),
+    *,
+    parts: bool = False,
 ) -> dict[Path, str]:
     """File -> contents of a copy of an architecture under another name, by default NAME.toml.
 
     components: which of them get a file of their own to edit, in components/ beside it; ["all"] for every one.
+    parts: write the coupling out as the parts that its kind stands for
     Raises DataError for a name that is none or is shipped, and where a file is there already.
     """
     out = Path(f"{name}.toml") if out is None else out
     _check_name(name, out)
     copied = _wanted(components)
-    original = load_architecture(like).source
+    car = load_architecture(like)
+    original = car.source
     contents, texts = read_contents(original), {}
+    if parts:
+        contents = {**contents, "coupling": written_out(car.driveline)}
     references: dict[str, str | dict[str, Any]] = {}
     for key in filter(contents.get, COMPONENTS):
         found = component_contents(original, key, contents[key], {})

@@ -26,13 +26,16 @@ def new(
             "engine, gearbox, machine, battery, separated by commas, or all.",
         ),
     ] = None,
+    parts: Annotated[
+        bool, typer.Option("--parts", help="Write the coupling out, part by part.")
+    ] = False,
 ) -> None:
     """Write a commented architecture to edit, with the same results as the one it is like."""
     from hevopt.car_files.template import new_files
     from hevopt.files.shown import encodable
     from hevopt.files.writing import check_writable, note_asked, write_whole
 
-    files = new_files(name, like, out, listed(components) or ())
+    files = new_files(name, like, out, listed(components) or (), parts=parts)
     check_writable(list(files)[-1])
     for path in files:
         note_asked(path)

@@ -1,7 +1,7 @@
 """Driving cycles: a CSV file of speed over time, checked and read into a frozen type.
 
 Columns: `time_s`; one of `speed_mps`, `speed_kmh`, `speed_mph`; optional `gear` (0 neutral), `clutch_open`
-(0 or 1), `grade` (rise / run). Row k of gear, clutch and grade holds from its time to the next.
+(0 or 1), `grade` (rise / run), `auxiliary_power_w` (electric load). Row k of these holds from its time to the next.
 Lines that begin with # are comments.
 """
 
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SPEED_COLUMNS = ("speed_mps", "speed_kmh", "speed_mph")
-COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade")
+COLUMNS = ("time_s", *_SPEED_COLUMNS, "gear", "clutch_open", "grade", "auxiliary_power_w")
+_AUXILIARY_MAX_W = 50_000.0
 _MEGABYTES_MAX = 50
 SAMPLES_MAX = 200_000
 # Figures per distance say nothing below this.
@@ -46,6 +47,7 @@ class Cycle(Shown):
 
     time_s, speed_mps: (sample,)
     gear: (sample,) 0 neutral; clutch_open: (sample,) bool; grade: (sample,) rise / run
+    auxiliary_w: (sample,) electric load in place of the car's, None where the file lists none
     source: the file it was read from, None for a trace that came from none
     """
 
@@ -56,9 +58,10 @@ class Cycle(Shown):
     gear: NDArray[np.int64] | None = None
     clutch_open: NDArray[np.bool_] | None = None
     source: Path | None = None
+    auxiliary_w: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        for field in ("time_s", "speed_mps", "grade", "gear", "clutch_open"):
+        for field in ("time_s", "speed_mps", "grade", "gear", "clutch_open", "auxiliary_w"):
             values = getattr(self, field)
             if values is not None:
                 values = np.array(values)
@@ -156,13 +159,23 @@ def _cycle(path: Path, text: str, tell: Tell) -> Cycle:
     grade = columns.get("grade", np.zeros(len(rows)))
     check_time_and_speed(lines, columns["time_s"], speed_mps, speed_column, factor, tell)
     check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell)
+    auxiliary = columns.get("auxiliary_power_w")
+    if auxiliary is not None:
+        check_range(lines, "auxiliary_power_w", auxiliary, 0.0, _AUXILIARY_MAX_W, tell)
     gear = clutch_open = None
     if "gear" in columns:
         gear = whole_numbers(lines, "gear", columns["gear"], 20, tell)
         clutch = columns.get("clutch_open", np.zeros(len(rows)))
         clutch_open = whole_numbers(lines, "clutch_open", clutch, 1, tell).astype(bool)
     cycle = Cycle(
-        printable(path.stem), columns["time_s"], speed_mps, grade, gear, clutch_open, path
+        printable(path.stem),
+        columns["time_s"],
+        speed_mps,
+        grade,
+        gear,
+        clutch_open,
+        path,
+        auxiliary,
     )
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(

@@ -19,7 +19,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Demand(Shown):
-    """Wheel torque and speed per step; every array is (time,). Torque > 0 drives the car."""
+    """Wheel torque and speed per step; every array is (time,). Torque > 0 drives the car.
+
+    auxiliary_w: electric load as the cycle lists it, None where it is the car's
+    """
 
     time_s: Array
     step_s: Array
@@ -29,6 +32,7 @@ class Demand(Shown):
     wheel_accel_radps2: Array
     gear: NDArray[np.int64]
     clutch_open: NDArray[np.bool_]
+    auxiliary_w: Array | None = None
 
     @property
     def wheel_power_w(self) -> Array:
@@ -80,5 +84,5 @@ def demand_of(cycle: Cycle, vehicle: Vehicle, gearbox: Gearbox | None) -> Demand
     radius = vehicle.tyre_radius_m
     return Demand(
         cycle.time_s[:-1], step_s, speed, force * radius, speed / radius, accel / radius,
-        gear, clutch_open,
+        gear, clutch_open, None if cycle.auxiliary_w is None else cycle.auxiliary_w[:-1],
     )  # fmt: skip

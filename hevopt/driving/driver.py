@@ -29,7 +29,7 @@ def change_down(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearb
     gear = demand.gear.copy()
     for _ in range(len(gearbox.ratios) - 2):
         speed, need = _engine_speed_and_need(demand, gear, engine, gearbox)
-        need = need + vehicle.auxiliary_power_w / _ALTERNATOR_EFFICIENCY_MIN / speed
+        need = need + _load_w(demand, vehicle) / _ALTERNATOR_EFFICIENCY_MIN / speed
         short = (gear > 1) & (need > engine.full_load_nm(speed))
         lower = np.maximum(gear - 1, 1)
         lower_speed = gearbox.ratios[lower] * demand.wheel_speed_radps
@@ -67,11 +67,15 @@ def gap_shares(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbo
     changed = (demand.gear != before) & (demand.gear > 0) & (before > 0) & ~still
     changed[1:] &= ~still[:-1]
     speed, need = _engine_speed_and_need(demand, demand.gear, engine, gearbox)
-    need = np.maximum(need, 0.0) + vehicle.auxiliary_power_w / _ALTERNATOR_EFFICIENCY_MIN / speed
+    need = np.maximum(need, 0.0) + _load_w(demand, vehicle) / _ALTERNATOR_EFFICIENCY_MIN / speed
     most = np.nan_to_num(engine.covered_nm(speed))
     spare = 1 - _NEED_MARGIN * need / np.maximum(most, _LEAST_NM)
     share = np.minimum(gearbox.shift_gap_s / demand.step_s, _GAP_SHARE_MAX)
     return np.where(changed, np.clip(share, 0.0, np.maximum(spare, 0.0)), 0.0)
+
+
+def _load_w(demand: Demand, vehicle: Vehicle) -> Array | float:
+    return vehicle.auxiliary_power_w if demand.auxiliary_w is None else demand.auxiliary_w
 
 
 def _engine_speed_and_need(

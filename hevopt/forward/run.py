@@ -223,6 +223,11 @@ def _check(cycle: Cycle, step_s: float, handling: Handling) -> None:
     low, high = STEP_RANGE_S
     if not low <= step_s <= high:
         raise DataError(f"step {step_s:g} s; allowed: {low:g} to {high:g} s")
+    if cycle.auxiliary_w is not None:
+        raise DataError(
+            f"cycle {cycle.name}: its column auxiliary_power_w cannot be driven forward yet; take it out for this, "
+            "and give the car's file a mean load"
+        )
     if cycle.duration_s / step_s > STEPS_MAX:
         raise DataError(
             f"cycle {cycle.name}: {cycle.duration_s / step_s:.3g} steps of {step_s:g} s; allowed: {STEPS_MAX:g}; "

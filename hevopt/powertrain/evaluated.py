@@ -27,7 +27,7 @@ def evaluated(here: Setting, state: State, given: Mapping[str, Array], step_s: A
     """Torques given, (state, level), with everything that follows; step_s: (time,)."""
     torques = completed(here, given)
     flows, length_s = flowing(here, torques), step_s[here.shafts.step][:, None]
-    battery = flows.machines_w + here.car.vehicle.auxiliary_power_w
+    battery = flows.machines_w + here.shafts.load_w[:, None]
     # What an alternator that follows its load leaves to the battery is rounding, not charge.
     battery = np.where(np.abs(battery) < _ROUNDING_W, 0.0, battery)
     reject = (
@@ -56,7 +56,7 @@ def battery_idle(
     a, b = (np.take_along_axis(torque, at + n, 1) for n in (0, 1))
     fa, fb = (np.take_along_axis(battery_w, at + n, 1) for n in (0, 1))
     rest = {other: values for other, values in given.items() if other != name}
-    middle, load_w = a, here.car.vehicle.auxiliary_power_w
+    middle, load_w = a, here.shafts.load_w[:, None]
     for _ in range(passes):
         with np.errstate(invalid="ignore", divide="ignore"):
             middle = np.where(fb != fa, b - fb * (b - a) / (fb - fa), b)

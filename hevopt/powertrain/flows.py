@@ -165,5 +165,5 @@ def _flows(here: Setting, torques: Mapping[str, Array]) -> dict[str, Array]:
         "machine_inertia_w": machine_inertia_w,
         "brake_power_w": -torques[BRAKE] * wheel_speed,
         "wheel_power_w": shafts.wheel_nm[:, None] * wheel_speed,
-        "auxiliary_power_w": np.full((1, 1), here.car.vehicle.auxiliary_power_w),
+        "auxiliary_power_w": shafts.load_w[:, None],
     }

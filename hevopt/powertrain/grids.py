@@ -151,7 +151,7 @@ def _speed_limits(car: Architecture, demand: Demand, stretch: Stretch) -> tuple[
 def _best_speeds(car: Architecture, demand: Demand, stretch: Stretch) -> Array:
     """(step, power) engine speeds of least fuel for the demand and a little more."""
     wheels_w = np.maximum(demand.wheel_power_w[stretch.step], 0.0)
-    power_w = (wheels_w + car.vehicle.auxiliary_power_w)[:, None] * _DEMAND_SHARES
+    power_w = (wheels_w + stretch.shafts.load_w)[:, None] * _DEMAND_SHARES
     return car.engine.best_radps(power_w)
 
 
@@ -262,7 +262,7 @@ def most_nm(points: Gridded, stuck: Flags) -> tuple[Indices, Array]:
         given = {name: points.given[name][state] for name in way.chosen} | {way.slack: share * full}
         torques = completed(part, given)
         flows = flowing(part, torques)
-        battery_w = flows.machines_w + here.car.vehicle.auxiliary_power_w
+        battery_w = flows.machines_w + part.shafts.load_w[:, None]
         within = within_limits(here.car.battery, battery_w)
         again = points.repeats if len(points.repeats) == 1 else points.repeats[state]
         within = within & ~flows.off_engine_map & ~flows.off_machine_map & ~again

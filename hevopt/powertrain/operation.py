@@ -75,7 +75,7 @@ class Setting(Shown):
         """(state,) torque at which a machine supplies the electric load and no more; 0 where it cannot."""
         machine, speed, share = self.machines[name], self.speed_radps(name), self.active(name)
         between_w = (1 - share) * machine.loss_w(np.zeros(len(speed)), speed)
-        load_w = (self.car.vehicle.auxiliary_power_w + between_w) / share
+        load_w = (self.shafts.load_w + between_w) / share
         return np.nan_to_num(share * machine.generating_nm(load_w, speed))
 
     def least_braked(self, given: Mapping[str, Array]) -> dict[str, Array]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.balance import speeds_of
+from hevopt.car.driveline import ENGINE
 from hevopt.car.linear import Coefficient, Terms
 from hevopt.car.parts import WHEEL
 from hevopt.car.ways import Way
@@ -21,7 +22,7 @@ class Shafts(Shown):
 
     step, gear: index and listed gear of each state's step; wheel_nm: torque that the wheels ask for
     acting_nm: shaft -> torque that its inertia takes, and on the wheels also what they ask for; none where it is 0
-    gap: share of the step without torque through the listed gearbox
+    gap: share of the step without torque through the listed gearbox; load_w: electric load
     inertia_w: power that the inertia of the engine takes, and that of all machines
     """
 
@@ -33,6 +34,7 @@ class Shafts(Shown):
     inertia_w: tuple[Array, Array]
     wheel_nm: Array
     gap: Array
+    load_w: Array
 
     def at(self, coefficient: Coefficient) -> Coefficient:
         """A coefficient in the gear of each state."""
@@ -54,6 +56,7 @@ class Shafts(Shown):
             inertia_w=(self.inertia_w[0][state], self.inertia_w[1][state]),
             wheel_nm=self.wheel_nm[state],
             gap=self.gap[state],
+            load_w=self.load_w[state],
         )
 
 
@@ -83,7 +86,9 @@ def shafts_of(
     acting, inertia_w = _inertia(car, way, gear, speeds, accels)
     acting[WHEEL] = acting[WHEEL] + wheel_nm if WHEEL in acting else wheel_nm
     gap = np.zeros(step.shape)
-    return Shafts(step, gear, speeds, accels, acting, inertia_w, wheel_nm, gap)
+    own_w = car.vehicle.load_w(engine_on=ENGINE in way.active)
+    load_w = np.full(step.shape, own_w) if demand.auxiliary_w is None else demand.auxiliary_w[step]
+    return Shafts(step, gear, speeds, accels, acting, inertia_w, wheel_nm, gap, load_w)
 
 
 def value_of(terms: Terms, inputs: Mapping[str, Array], gear: Indices) -> Array:

@@ -32,6 +32,7 @@ class Battery(Shown):
     soc: (point,) increasing, from at most soc_min to at least soc_max
     open_circuit_v, discharge_ohm, charge_ohm: (point,)
     power_max_*_w and current_max_*_a: limits at the terminals, inf where there is none
+    voltage_*_v: lowest while it discharges and highest while it charges, at the terminals
     """
 
     soc: Array
@@ -46,6 +47,8 @@ class Battery(Shown):
     power_max_charge_w: float = np.inf
     current_max_discharge_a: float = np.inf
     current_max_charge_a: float = np.inf
+    voltage_min_v: float = 0.0
+    voltage_max_v: float = np.inf
 
     def __post_init__(self) -> None:
         for field in ("soc", "open_circuit_v", "discharge_ohm", "charge_ohm"):
@@ -92,6 +95,13 @@ class Battery(Shown):
             raise DataError(
                 f"battery: SOC window [{self.soc_min:g}, {self.soc_max:g}] is empty or outside the "
                 f"curves' range [{self.soc[0]:g}, {self.soc[-1]:g}]; allowed: min < max within it"
+            )
+        low_v, high_v = np.interp([self.soc_min, self.soc_max], self.soc, self.open_circuit_v)
+        if not 0 <= self.voltage_min_v < low_v or not self.voltage_max_v > high_v:
+            raise DataError(
+                f"battery: voltage limits {self.voltage_min_v:g} and {self.voltage_max_v:g} V of the pack; its "
+                f"open-circuit voltage runs from {low_v:g} to {high_v:g} V in the SOC window; allowed: a lowest "
+                "below and a highest above these"
             )
 
     @property
@@ -215,7 +225,8 @@ def power_limits_w(battery: Battery) -> tuple[float, float]:
     Between two points of the curves U and R are linear in SOC. With a current limit i it takes U i + R i², linear,
     so least at a point. It delivers U i - R i², linear, or where i is beyond U / 2R the peak U² / 4R, which is
     convex (a square over a linear function): least at a point, where both are the same, or where the peak is
-    level, at 2 R U' = U R'.
+    level, at 2 R U' = U R'. A voltage limit V lets V |V - U| / R through, a quotient of two linear functions, which
+    is monotone between points; where V is below U / 2 the peak comes first.
     """
     ends = np.array([battery.soc_min, battery.soc_max])
     inner = battery.soc[(battery.soc > ends[0]) & (battery.soc < ends[1])]
@@ -227,10 +238,24 @@ def power_limits_w(battery: Battery) -> tuple[float, float]:
     limit = battery.current_max_charge_a
     taken = np.inf if limit == np.inf else float(np.min(voltage * limit + charge * limit**2))
     delivered = _least_delivered_w(voltage, discharge, battery.current_max_discharge_a)
+    taken = min(taken, _least_at_w(battery.voltage_max_v, battery.voltage_max_v - voltage, charge))
+    lowest = battery.voltage_min_v
+    # Down to half of the open-circuit voltage the power still rises with the current.
+    limits = lowest >= voltage / 2
+    drop_v = np.where(limits, voltage - lowest, np.inf)
+    delivered = min(delivered, _least_at_w(lowest, drop_v, discharge))
     return (
         -min(taken, battery.power_max_charge_w),
         min(delivered, battery.power_max_discharge_w),
     )
+
+
+def _least_at_w(limit_v: float, drop_v: Array, ohm: Array) -> float:
+    """Least power at a voltage limit, (point,) away from open circuit by a drop; inf without any."""
+    bounded = np.isfinite(drop_v) & (ohm > 0)
+    if not bounded.any():
+        return np.inf
+    return float(np.min(limit_v * drop_v[bounded] / ohm[bounded]))
 
 
 def within_limits(battery: Battery, power_w: Array) -> Flags:

@@ -40,7 +40,7 @@ def _floats(value: Any) -> Any:
 
 def cycle_contents(cycle: Cycle) -> dict[str, Any]:
     """Everything of a cycle that a result depends on, as lists."""
-    fields = ("time_s", "speed_mps", "grade", "gear", "clutch_open")
+    fields = ("time_s", "speed_mps", "grade", "gear", "clutch_open", "auxiliary_w")
     arrays = {name: getattr(cycle, name) for name in fields}
     return {name: None if a is None else a.tolist() for name, a in arrays.items()}
 

@@ -62,6 +62,7 @@ def drawn_point(rng, line):
         (None, None),
         acting[WHEEL],
         np.zeros(1),
+        np.zeros(1),
     )
     given = {name: rng.normal(0, 100, (1, 7)) for name in found.chosen}
     if found.slack is not None:
