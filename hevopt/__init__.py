@@ -24,6 +24,7 @@ _HOME = {
     "Strategy": "hevopt.strategies",
     "register": "hevopt.strategies",
     "stepwise": "hevopt.strategies.stepwise",
+    "policy": "hevopt.strategies.policy",
     "Step": "hevopt.strategies.stepwise",
     "Stepper": "hevopt.strategies.stepper",
     "Signals": "hevopt.problem.table",

@@ -22,11 +22,13 @@ from hevopt.files.keypaths import with_changes
 from hevopt.files.lookup import find, shipped_names
 from hevopt.files.shown import printable
 from hevopt.files.toml import read_contents
-from hevopt.strategies import strategy_named
+from hevopt.strategies import chosen, strategy_named
+from hevopt.strategies.brought import is_reference, located
 from hevopt.studies.cars import cars_of
 from hevopt.studies.settings import KEYS, NAMES_MAX, CompareFile, study_of
 from hevopt.studies.solved import EVERY, check_horizon
 from hevopt.studies.study_file import beside_study, changes_in, read_study
+from hevopt.sweeps.plan.brought import check_defined
 from hevopt.sweeps.plan.study_file import study_and_faults
 
 
@@ -44,7 +46,7 @@ def compare_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[lis
             faults += _named_faults(path, key, name, wanted)
     for name in names("strategies"):
         if name != EVERY:
-            faults += tried(path, "strategies", partial(strategy_named, name))
+            faults += tried(path, "strategies", partial(_check_strategy, name, path.parent))
     cars = names("architectures")
     good = not faults
     try:
@@ -56,14 +58,26 @@ def compare_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[lis
         faults += in_set
         if good:
             if names("strategies") != [EVERY]:
-                faults += tried(
-                    path,
-                    "strategies",
-                    lambda: check_horizon(contents.get("horizon_s"), names("strategies")),
+                found = partial(
+                    _check_preview, contents.get("horizon_s"), names("strategies"), path
                 )
+                faults += tried(path, "strategies", found)
             faults += _settings_faults(path, _good(path, changes, cars) if in_set else changes)
     listed = cars or ["the shipped architectures"]
     return faults, ", ".join([*(names("cycle") or ["nedc"]), *listed])
+
+
+def _check_strategy(name: str, folder: Path) -> None:
+    """DataError for a strategy that there is not, or a function that its file does not have."""
+    if is_reference(name):
+        check_defined(located(name, folder))
+    else:
+        strategy_named(name)
+
+
+def _check_preview(horizon_s: float | None, wanted: list[str], path: Path) -> None:
+    """DataError for a preview that none of a study's strategies takes."""
+    check_horizon(horizon_s, wanted, chosen(wanted, path.parent)[1])
 
 
 def _named_faults(study: Path, key: str, name: str, wanted: str) -> list[str]:

@@ -1,5 +1,6 @@
 """What `hevopt compare` is told, the files it leaves behind, and what it prints."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from hevopt.driving.cycle import Cycle
     from hevopt.pages.comparison.collect import Collector
     from hevopt.problem.problem import Plan, Trajectory
+    from hevopt.strategies import Strategy
     from hevopt.studies.cars import Cars
     from hevopt.studies.case import Case
     from hevopt.studies.comparison import Comparison
@@ -25,12 +27,15 @@ _NAMED = ("nox_weight", "allow_shortfall", "free_gear", "refine", "horizon_s")
 
 @dataclass(frozen=True)
 class ComparisonJob:
-    """Cars on a cycle, the settings that they are solved with, and the study file, if they come from one."""
+    """Cars on a cycle, the settings that they are solved with, the study file, if they come from one, and the
+    strategies that were brought, by name.
+    """
 
     cars: "Cars"
     trace: "Cycle"
     settings: "Settings"
     file: Path | None = None
+    brought: "Mapping[str, Strategy]" = field(default_factory=dict)
 
     @cached_property
     def inputs(self) -> dict[str, str]:
@@ -42,7 +47,9 @@ class ComparisonJob:
     @property
     def others(self) -> list[Path]:
         """Files read beside those of cars and cycle."""
-        return [] if self.file is None else [self.file]
+        places = [other.place for other in self.brought.values()]
+        files = [place.file for place in places if place is not None and place.file.is_file()]
+        return ([] if self.file is None else [self.file]) + files
 
     @cached_property
     def about(self) -> dict[str, Any]:
@@ -119,7 +126,7 @@ class Files:
 
         check_steps(job.trace)
         cars, steps = job.cars.cars, len(job.trace.time_s) - 1
-        rows = sum(len(strategies_for(car, job.settings.strategies, {})) for car in cars)
+        rows = sum(len(strategies_for(car, job.settings.strategies, job.brought)) for car in cars)
         check_planned(steps, len(cars), rows)
         self._collector = Collector()
 

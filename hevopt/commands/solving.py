@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from hevopt.commands.brought import PolicyOption
 from hevopt.commands.options import (
     ArchitectureArgument,
     CycleGivenOption,
@@ -33,6 +34,7 @@ def compare(
     architectures: Annotated[
         str | None, typer.Option("--architectures", help="Names or files, separated by commas.")
     ] = None,
+    policy: PolicyOption = None,
     json: JsonOption = False,
     wide: WideOption = False,
     out: Annotated[
@@ -64,6 +66,7 @@ def compare(
     ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
+    from hevopt.commands.brought import brought_to
     from hevopt.commands.comparing import ComparisonJob, Files, show_comparison
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
@@ -76,11 +79,14 @@ def compare(
     options = given | {name: value for name, value in named.items() if value is not None}
     below = {"set": {}} if study_path is None else read_study(study_path)
     asked = study_of(joined(below, given_of(_OPTIONS, options)))
-    cars = cars_of(asked.architectures, asked.settings)
-    job = ComparisonJob(cars, load_cycle(asked.cycle), asked.settings, study_path)
+    of_study = study_path is not None and "strategies" not in options
+    folder = study_path.parent if study_path is not None and of_study else None
+    settings, others = brought_to(asked.settings, policy, folder)
+    cars = cars_of(asked.architectures, settings)
+    job = ComparisonJob(cars, load_cycle(asked.cycle), settings, study_path, others)
     files = Files(out, steps, page, save, proofs, fronts, effects)
     files.check(job)
-    compared = partial(study.compare_cars, cars.cars, settings=asked.settings)
+    compared = partial(study.compare_cars, cars.cars, settings=settings, others=others)
     say_how_long(job.trace, compared)
     with Progress() as progress:
         comparison = compared(job.trace, watch=study.Watch(progress, files.observe))
@@ -100,7 +106,10 @@ def compare(
 def run(
     given: dict[str, Any],
     architecture: ArchitectureArgument,
-    strategy: Annotated[str, typer.Option("--strategy", help="Name of a strategy.")] = "dp",
+    strategy: Annotated[
+        str | None, typer.Option("--strategy", help="Name of a strategy (default: dp).")
+    ] = None,
+    policy: PolicyOption = None,
     cycle: CycleOption = "nedc",
     out: Annotated[
         Path | None,
@@ -113,33 +122,39 @@ def run(
     wide: WideOption = False,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
+    from hevopt.commands.brought import one_of
     from hevopt.commands.comparing import ComparisonJob, show_rows
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
     from hevopt.output import file_tables as outputs
     from hevopt.output import terminal_tables as report
-    from hevopt.strategies import strategy_named
     from hevopt.studies import comparison as study
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
     from hevopt.studies.settings import given_of, study_of
-    from hevopt.studies.solved import check_horizon, run_case
+    from hevopt.studies.solved import causal_among, check_horizon, run_case, why_not_causal
 
     settings = study_of(given_of(_OPTIONS, given)).settings
-    check_horizon(settings.horizon_s, [strategy])
-    job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)
+    name, others = one_of(strategy, policy)
+    check_horizon(settings.horizon_s, [name], others)
+    job = ComparisonJob(
+        cars_of([architecture], settings), load_cycle(cycle), settings, None, others
+    )
     car, trace = job.cars.cars[0], job.trace
     if out is not None:
         check_outs({"--out": out}, job.inputs)
         outputs.check_table_file(out)
     prepared = partial(prepare, car, settings=settings)
-    say_how_long(trace, lambda piece: run_case(prepared(piece), strategy, settings.horizon_s))
+    solved = partial(run_case, strategy=name, horizon_s=settings.horizon_s, others=others)
+    say_how_long(trace, lambda piece: solved(prepared(piece)))
     with Progress() as progress:
         progress(f"{car.name}: table and certificate", 0, 1)
         case = prepared(trace)
-        progress(f"{car.name}: {strategy}", 0, 1)
-        row, plan, trajectory = run_case(case, strategy, settings.horizon_s)
+        progress(f"{car.name}: {name}", 0, 1)
+        row, plan, trajectory = solved(case)
+        shown = why_not_causal(case, name, plan, others)
+    peeking = {} if shown is None else {(car.name, name): shown}
     comparison = study.Comparison(
         trace.name,
         [row],
@@ -147,7 +162,8 @@ def run(
         settings.nox_weight,
         end_asked=study.end_asked([car]),
         lost_proofs=study.lost_proofs(case),
-        causal=frozenset([strategy]) if strategy_named(strategy).causal else frozenset(),
+        causal=causal_among([row], peeking, others),
+        peeking=peeking,
     )
     if out is not None:
         steps = outputs.step_frame(case, trajectory)

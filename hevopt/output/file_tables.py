@@ -42,13 +42,16 @@ def check_table_file(path: Path) -> None:
 
 
 def result(comparison: Comparison, about: Mapping[str, Any]) -> dict[str, Any]:
-    """{"cycle", "rows"} and what the rows come from; None where a figure does not exist.
+    """{"cycle", "rows", "causal"} and what the rows come from; None where a figure does not exist.
 
-    "lost_proofs" is there where a proof was tried and not found, see `Comparison`.
+    "lost_proofs" is there where a proof was tried and not found, "peeking" where a strategy knows more than it
+    says, see `Comparison`.
     """
     rows = [row.as_dict() for row in comparison.rows]
     lost = {"lost_proofs": dict(comparison.lost_proofs)} if comparison.lost_proofs else {}
-    return {"cycle": comparison.cycle, "rows": rows, **lost, **about}
+    peeking = {f"{car} {name}": why for (car, name), why in comparison.peeking.items()}
+    marks = {"causal": sorted(comparison.causal), **({"peeking": peeking} if peeking else {})}
+    return {"cycle": comparison.cycle, "rows": rows, **marks, **lost, **about}
 
 
 def result_json(comparison: Comparison, about: Mapping[str, Any]) -> str:

@@ -139,6 +139,7 @@ def comparison_notes(comparison: Comparison) -> str:
         f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
         "gap: how far the row is above it.\n"
         f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
+        f"{_peeking_note(comparison)}"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
         "lower-bound DP = a cost-to-go nowhere above the true one.\n"
         f"The engine is warm from start to end; gears: {gears}."
@@ -164,6 +165,14 @@ def _end_notes(comparison: Comparison) -> str:
         "ΔE/fuel and corrected count only what is left beyond it;\n"
         "electricity drawn from the battery down to it (or stored up to it) is the column battery, from start to "
         "end; it is not counted as fuel, nor in vs ref.\n"
+    )
+
+
+def _peeking_note(comparison: Comparison) -> str:
+    """What shows that strategies know more of the cycle than they say, so that they are not marked."""
+    return "".join(
+        f"not causal, {printable(f'{car} {strategy}: {why}')}.\n"
+        for (car, strategy), why in comparison.peeking.items()
     )
 
 

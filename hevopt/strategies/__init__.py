@@ -2,7 +2,8 @@
 `register`, or with the call that uses them.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from hevopt.errors import DataError, unknown_name
@@ -25,10 +26,14 @@ from hevopt.strategies.brought import (
     Guarded,
     Located,
     check_name,
+    claims_causal,
+    is_reference,
     located,
     pairs_of,
     place_of,
 )
+from hevopt.strategies.installed import installed
+from hevopt.strategies.policy import asked_of
 from hevopt.strategies.stepper import Stepper
 
 
@@ -127,12 +132,13 @@ _registered: dict[str, Strategy] = {}
 
 
 def every_strategy() -> dict[str, Strategy]:
-    """The shipped strategies, and those that were registered."""
-    return STRATEGIES | _registered
+    """The shipped strategies, those of installed packages, and those that were registered."""
+    places, _ = installed(tuple(STRATEGIES))
+    return STRATEGIES | {name: brought(name, place) for name, place in places.items()} | _registered
 
 
 def strategy_named(name: str, others: Mapping[str, Strategy] = _NO_OTHERS) -> Strategy:
-    """The strategy of a name, shipped, registered or one of some others; DataError with the close matches."""
+    """The strategy of a name, shipped, installed, registered or of some others; DataError with close matches."""
     known = {**every_strategy(), **others}
     if name not in known:
         raise unknown_name("strategy", name, list(known))
@@ -149,9 +155,10 @@ def register(
 ) -> None:
     """Make a strategy of your own known by a name: to `compare`, fronts, sensitivities, sweeps and pages.
 
-    solve: a function from Problem to (time,) control indices or a Plan; FILE.py:FUNCTION or MODULE:FUNCTION,
-    imported when it is first used; or a Strategy, which says the rest itself
-    causal: decides each step without knowing more of the cycle than `knows` says
+    solve: a function from Problem to (time,) control indices or a Plan; a `policy`, which is asked step by step;
+    FILE.py:FUNCTION or MODULE:FUNCTION, imported when it is first used; or a Strategy, which says the rest itself
+    causal: decides each step without knowing more of the cycle than `knows` says, as policies always declare; where
+    its decisions show that they do know more, a comparison does not mark it, and says so
     usual: part of a comparison that names no strategies
     What it returns is driven by `simulate`: whatever it does wrong is a failed row with one message. A name
     that is registered again stands for the new one. DataError for the name of a shipped one, or where there is no
@@ -177,19 +184,47 @@ def brought(name: str, what: Any, **marks: Any) -> Strategy:
             f"indices or a Plan, or {FORMS}"
         )
     place = place_of(what) if place is None else place
-    return Strategy(**marks | {"solve": Guarded(name, what), "place": place})
+    guarded = Guarded(name, what)
+    stepped = isinstance(what, Elsewhere) or asked_of(what) is not None
+    start = guarded.start if stepped else None
+    return Strategy(**marks | {"solve": guarded, "place": place, "start": start})
 
 
-def chosen(wanted: Any) -> tuple[list[str] | None, dict[str, Strategy]]:
+def is_causal(strategy: Strategy) -> bool:
+    """Whether a strategy says not to know the rest of the cycle; one that stands elsewhere is imported."""
+    return strategy.causal or claims_causal(strategy.solve)
+
+
+def chosen(wanted: Any, folder: Path | None = None) -> tuple[list[str] | None, dict[str, Strategy]]:
     """The names of what users want, None for the usual ones, and the strategies that they bring along by some.
 
-    wanted: a name, a list of names and pairs (name, function), or a mapping of name to function
+    wanted: a name, a list of names and pairs (name, function), or a mapping of name to function; a name may be
+    FILE.py:FUNCTION or MODULE:FUNCTION. folder: from where files are taken
     """
     pairs = pairs_of(wanted)
     if pairs is None:
         return None, {}
     own = {name: brought(name, what) for name, what in pairs if what is not None}
+    known = every_strategy().keys() | own.keys()
+    for name, _ in pairs:
+        if isinstance(name, str) and is_reference(name) and name not in known:
+            own[name] = brought(name, located(name, folder))
     return [name for name, _ in pairs], own
+
+
+def policies(references: Sequence[str]) -> dict[str, Strategy]:
+    """Strategies by the names of their functions; by the reference where that name is taken, or given twice.
+
+    references: each FILE.py:FUNCTION or MODULE:FUNCTION. They are part of every comparison they are given to.
+    """
+    places = {reference: located(reference) for reference in dict.fromkeys(references)}
+    short = [place.function for place in places.values()]
+    own = {}
+    for reference, place in places.items():
+        alone = short.count(place.function) == 1 and place.function not in every_strategy()
+        name = place.function if alone and place.function not in ("all", "bound") else reference
+        own[name] = brought(name, place, usual=True)
+    return own
 
 
 def fitting(functions: frozenset[str], *, every: bool = False) -> list[str]:

@@ -1,4 +1,5 @@
-"""Strategies that users bring: a function from Problem to control indices or a Plan, by a name of its own.
+"""Strategies that users bring, by a name of their own: a function from Problem to control indices or a Plan, or a
+policy, which is asked step by step.
 
 Whatever such a function does, its callers get a plan that `simulate` has driven, or an error of this package that
 names the strategy: it may raise, return something else, a wrong length, NaN or a control that cannot be used.
@@ -24,8 +25,13 @@ from hevopt.errors import (
     SolverError,
     comes_from_interrupt,
 )
+from hevopt.problem.arrays import Indices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import simulate
+from hevopt.strategies.causality import peeks
+from hevopt.strategies.policy import asked_of, asking
+from hevopt.strategies.stepper import driven
+from hevopt.strategies.stepwise import AskedRule
 
 NAME_MAX = 80
 _SAID_MAX = 500
@@ -45,7 +51,7 @@ class Guarded(NamedTuple):
 
     def __call__(self, problem: Problem, **settings: Any) -> Plan:
         try:
-            found = self.function(problem, **settings)
+            found = self._planned(problem, settings)
         except HevoptError as error:
             kind = InfeasibleError if isinstance(error, InfeasibleError) else SolverError
             raise kind(f"strategy {self.name}: {error}") from error
@@ -54,6 +60,7 @@ class Guarded(NamedTuple):
                 raise
             raise SolverError(
                 f"strategy {self.name} raised {type(error).__name__}: {_said(error)}{_place(error)}"
+                f"{self._hint(error)}"
             ) from error
         plan = found.control if isinstance(found, Plan) else found
         if not isinstance(plan, list | tuple | np.ndarray):
@@ -65,6 +72,45 @@ class Guarded(NamedTuple):
             return Plan(simulate(problem, plan).control)
         except InfeasibleError as error:
             raise SolverError(f"strategy {self.name}: {error}") from None
+
+    @property
+    def resolved(self) -> Callable[..., Any]:
+        """The function itself, imported if it stands elsewhere."""
+        return self.function.found if isinstance(self.function, Elsewhere) else self.function
+
+    def _planned(self, problem: Problem, settings: Mapping[str, Any]) -> Any:
+        function = self.resolved
+        asked = asked_of(function)
+        if asked is None:
+            return function(problem, **settings)
+        if settings:
+            raise DataError(f"a policy takes no settings; found {', '.join(settings)}")
+        return driven(problem, asking(problem, function, asked))[0]
+
+    def _hint(self, error: BaseException) -> str:
+        if isinstance(error, AttributeError | TypeError) and asked_of(self.resolved) is None:
+            return "; it was given the whole Problem: @hevopt.policy marks a function to be asked step by step"
+        return ""
+
+    def start(self, problem: Problem) -> AskedRule:
+        """A policy as a stepper; SolverError for a function that plans the whole problem."""
+        function = self.resolved
+        asked = asked_of(function)
+        if asked is None:
+            raise SolverError(
+                f"strategy {self.name} plans the whole problem, and cannot be asked step by step; @hevopt.policy "
+                "marks a function that can"
+            )
+        return asking(problem, function, asked)
+
+    def why_not_causal(self, problem: Problem, control: Indices) -> str | None:
+        """What its decisions show to know of a future that it declares not to know; None for nothing."""
+        return peeks(problem, control, self.resolved)
+
+
+def claims_causal(solve: Callable[..., Any]) -> bool:
+    """Whether a brought strategy is a policy by its own declaration, imported for it if need be."""
+    return isinstance(solve, Guarded) and asked_of(solve.resolved) is not None
 
 
 def _said(error: BaseException) -> str:
@@ -140,8 +186,13 @@ class Elsewhere(NamedTuple):
 
     place: Located
 
+    @property
+    def found(self) -> Callable[..., Any]:
+        """The function; SolverError where its file raises or has no such function."""
+        return _imported(self.place)
+
     def __call__(self, problem: Problem, **settings: Any) -> Any:
-        return _imported(self.place)(problem, **settings)
+        return self.found(problem, **settings)
 
 
 def _imported(place: Located) -> Callable[..., Any]:

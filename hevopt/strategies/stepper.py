@@ -36,10 +36,10 @@ class Prescribed(Shown):
         return int(self.control[k])
 
 
-def driven(problem: Problem, stepper: Stepper) -> tuple[Indices, float]:
-    """(time,) controls of a stepper that drives the whole problem, and the stored energy at its end."""
+def driven(problem: Problem, stepper: Stepper, steps: int | None = None) -> tuple[Indices, float]:
+    """(time,) controls of a stepper that drives the problem, or its first steps, and the stored energy left."""
     table, battery = problem.table, problem.battery.arrays
-    control = np.empty(len(table.time_s), dtype=np.int64)
+    control = np.empty(len(table.time_s) if steps is None else steps, dtype=np.int64)
     energy_j, before = problem.start_j, problem.start_mode
     for k in range(len(control)):
         chosen = control[k] = stepper.decide(k, energy_j, before)

@@ -9,21 +9,25 @@ from numpy.typing import NDArray
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem import battery as battery_model
 from hevopt.problem.problem import Plan, Problem
-from hevopt.problem.switching import at_step
+from hevopt.problem.rows import rows_ahead
+from hevopt.problem.switching import Number, at_step
 from hevopt.strategies.stepper import driven
 
 Array = NDArray[np.float64]
 
 
 class Step(NamedTuple):
-    """The present step, as a rule sees it; nothing of what comes.
+    """The present step, as a rule sees it; of what comes, nothing but a preview that was asked for.
 
     k: its number; time_s: when it begins; step_s: how long it is
     soc, energy_j: state of charge and stored energy; mode: what the last control left
+    soc_min, soc_max: window of the state of charge; soc_end_min: the least asked at the end of the drive
     usable: (control,) whether it can be taken here: not rejected, its switch allowed, the charge kept in its window
     fuel_kg, nox_kg: (control,) in this step
     switch_fuel_kg, switch_energy_j: (control,) for the switch that leads there; the energy is taken before the step
     battery_power_w: (control,) at the terminals, > 0 discharges; engine_on: (control,)
+    drain_j: (control,) what the stored energy falls by, the switch included; NaN beyond what the voltage delivers
+    ahead: this step and those of the preview as a problem that starts here, its end charge free, or None
     speed_mps, wheel_power_w, gear: of the car; NaN, NaN and 0 where the table has no signals
     """
 
@@ -33,31 +37,40 @@ class Step(NamedTuple):
     soc: float
     energy_j: float
     mode: int
+    soc_min: float
+    soc_max: float
+    soc_end_min: float
     usable: NDArray[np.bool_]
     fuel_kg: Array
     nox_kg: Array
     switch_fuel_kg: Array
     switch_energy_j: Array
     battery_power_w: Array
+    drain_j: Array
     engine_on: NDArray[np.bool_]
+    ahead: Problem | None
     speed_mps: float
     wheel_power_w: float
     gear: int
 
 
-def stepwise(problem: Problem, decide: Callable[[Step], int]) -> Plan:
+def stepwise(problem: Problem, decide: Callable[[Step], int], *, preview: int = 0) -> Plan:
     """The plan of a rule that is asked at every step for the index of a control.
 
+    preview: steps after the present one that the rule is shown
     Raises InfeasibleError at the first step that leaves no usable control, DataError where the rule gives another.
     """
-    return Plan(driven(problem, AskedRule(problem, decide))[0])
+    return Plan(driven(problem, AskedRule(problem, decide, preview))[0])
 
 
 class AskedRule:
-    """A rule as a stepper: it is shown each step, and what it chooses is checked."""
+    """A rule as a stepper: it is shown each step, copied, and what it chooses is checked.
 
-    def __init__(self, problem: Problem, rule: Callable[[Step], int]) -> None:
-        self.problem, self.rule = problem, rule
+    preview: steps after the present one that the rule is shown
+    """
+
+    def __init__(self, problem: Problem, rule: Callable[[Step], int], preview: int = 0) -> None:
+        self.problem, self.rule, self.preview = problem, rule, preview
         self.window_j = problem.battery.granted_window_j
         self.engine_on = np.array([control.engine_on for control in problem.table.controls])
 
@@ -69,6 +82,9 @@ class AskedRule:
                 f"at {_place(now)} no control is left: each is rejected, needs a forbidden switch or takes the "
                 f"charge out of its window (SOC {now.soc:.4f})"
             )
+        if self.preview:
+            end = min(k + 1 + self.preview, len(self.problem.table.time_s))
+            now = now._replace(ahead=rows_ahead(self.problem, k, end, energy_j, mode))
         return _checked(now, self.rule(now))
 
 
@@ -100,6 +116,9 @@ def _step(
         soc=float(battery_model.soc(pack, energy_j)),
         energy_j=energy_j,
         mode=mode,
+        soc_min=pack.soc_min,
+        soc_max=pack.soc_max,
+        soc_end_min=problem.soc_end_min,
         # NaN, a power beyond what the voltage delivers, is outside.
         usable=table.feasible[k]
         & allowed
@@ -107,16 +126,25 @@ def _step(
         & (between_j <= window_j[1])
         & (after_j >= window_j[0])
         & (after_j <= window_j[1]),
-        fuel_kg=table.fuel_kg[k],
-        nox_kg=table.nox_kg[k],
-        switch_fuel_kg=switch_kg,
-        switch_energy_j=switch_j,
-        battery_power_w=power_w,
-        engine_on=engine_on,
+        fuel_kg=_copied(table.fuel_kg[k]),
+        nox_kg=_copied(table.nox_kg[k]),
+        switch_fuel_kg=_copied(switch_kg),
+        switch_energy_j=_copied(switch_j),
+        battery_power_w=_copied(power_w),
+        drain_j=_copied(energy_j - after_j),
+        engine_on=_copied(engine_on),
+        ahead=None,
         speed_mps=np.nan if signals is None else float(signals.speed_mps[k]),
         wheel_power_w=np.nan if signals is None else float(signals.wheel_power_w[k]),
         gear=0 if signals is None else int(signals.gear[k]),
     )
+
+
+def _copied(row: NDArray[Number]) -> NDArray[Number]:
+    """A row of its own, behind which no other stands, and which nobody can change."""
+    own = row.copy()
+    own.flags.writeable = False
+    return own
 
 
 def _checked(now: Step, chosen: int) -> int:

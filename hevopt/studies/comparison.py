@@ -24,7 +24,13 @@ from hevopt.studies.drawing import draw_rows
 from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row, against_reference, failed_row
 from hevopt.studies.settings import Keywords, Settings, settings_from
-from hevopt.studies.solved import check_horizon, run_case, strategies_for
+from hevopt.studies.solved import (
+    causal_among,
+    check_horizon,
+    run_case,
+    strategies_for,
+    why_not_causal,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,6 +48,7 @@ class Comparison(Shown):
     lost_proofs: architecture and kind of proof -> why it was tried and not found
     left_out: settings that have no meaning for some of the cars, and why
     causal: strategies of the rows that decide without knowing the rest of the cycle
+    peeking: car and strategy -> what shows that a strategy from outside knows more of the cycle than it says
     """
 
     cycle: str
@@ -54,6 +61,7 @@ class Comparison(Shown):
     lost_proofs: Mapping[str, str] = field(default_factory=dict)
     left_out: Sequence[str] = ()
     causal: frozenset[str] = frozenset()
+    peeking: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
     def _facts(self) -> dict[str, object]:
         failed = sum(not row.solved for row in self.rows)
@@ -131,7 +139,8 @@ def compare(
 
     cycle, architectures: names of shipped ones, files, or what was loaded; one, or several
     strategies: a name or a list of names, "all" for every one that fits; {name: function} for one of your own, also
-    as a pair in a list: a function from Problem to control indices or a Plan, see `register`
+    as a pair in a list: a policy, or a function from Problem to control indices or a Plan, see `register`; or
+    FILE.py:FUNCTION or MODULE:FUNCTION in place of a name
     progress: called with what comes next, and how many cases of how many are done
     observe: called with every solved case, its row (no reference yet), plan and trajectory
     settings: the fields of `Settings`, such as nox_weight, refine or mass_kg
@@ -172,6 +181,7 @@ def compare_cars(
     rows: list[Row] = []
     failures: dict[str, HevoptError] = {}
     lost: dict[str, str] = {}
+    peeking: dict[tuple[str, str], str] = {}
     for car, wanted in plans:
         done = len(rows)
         watch.progress(f"{car.name}: table and certificate", done, total)
@@ -184,7 +194,7 @@ def compare_cars(
         lost |= lost_proofs(case)
         for n, name in enumerate(wanted):
             watch.progress(f"{car.name}: {name}", done + n, total)
-            rows.append(_row(case, name, settings, others, watch, failures))
+            rows.append(_row(case, name, settings, others, watch, failures, peeking))
     _raise_unknown_nox(rows, failures)
     rows, reference = against_reference(rows)
     return Comparison(
@@ -196,7 +206,8 @@ def compare_cars(
         settings.free_gear,
         end_asked(cars),
         lost,
-        causal=frozenset(name for name in named if strategy_named(name, others).causal),
+        causal=causal_among(rows, peeking, others),
+        peeking=peeking,
     )
 
 
@@ -207,13 +218,20 @@ def _row(
     others: Mapping[str, Strategy],
     watch: Watch,
     failures: dict[str, HevoptError],
+    peeking: dict[tuple[str, str], str],
 ) -> Row:
-    """The row of a strategy, observed; where it fails, one that says so, and the error among the failures."""
+    """The row of a strategy, observed; where it fails, one that says so, and the error among the failures.
+
+    What shows that it knows more of the cycle than it says is put to what peeks.
+    """
     try:
         solved = run_case(case, strategy, settings.horizon_s, others)
+        shown = why_not_causal(case, strategy, solved[1], others)
     except _FAILURES as error:
         failures[f"{case.car.name} {strategy}"] = error
         return failed_row(case.car, strategy, error)
+    if shown is not None:
+        peeking[case.car.name, strategy] = shown
     watch.observe(case, *solved)
     return solved[0]
 

@@ -13,7 +13,8 @@ from hevopt.errors import DataError, SolverError
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
-from hevopt.strategies import Strategy, every_strategy, fitting, strategy_named
+from hevopt.strategies import Strategy, every_strategy, fitting, is_causal, strategy_named
+from hevopt.strategies.brought import Guarded
 from hevopt.studies.case import Case, require_nox
 from hevopt.studies.rows import Row, row_of
 
@@ -53,6 +54,29 @@ def run_case(
                 "too far from those of a car"
             )
     return row, plan, trajectory
+
+
+def why_not_causal(
+    case: Case, strategy: str, plan: Plan, others: Mapping[str, Strategy] = _NO_OTHERS
+) -> str | None:
+    """What shows that a brought strategy knows more of the cycle than it says; None for nothing."""
+    chosen = strategy_named(strategy, others)
+    if not isinstance(chosen.solve, Guarded) or not is_causal(chosen):
+        return None
+    return chosen.solve.why_not_causal(case.problem, plan.control)
+
+
+def causal_among(
+    rows: Iterable[Row],
+    peeking: Mapping[tuple[str, str], str],
+    others: Mapping[str, Strategy] = _NO_OTHERS,
+) -> frozenset[str]:
+    """Of the strategies of rows, those that decide without knowing the rest of the cycle.
+
+    peeking: car and strategy -> what shows that it knows more. One that solved nothing has shown nothing.
+    """
+    names = {row.strategy for row in rows if row.solved} - {name for _, name in peeking}
+    return frozenset(name for name in names if is_causal(strategy_named(name, others)))
 
 
 def told(case: Case, chosen: Strategy, horizon_s: float | None) -> dict[str, Any]:
@@ -107,7 +131,8 @@ def strategies_for(
     wanted: Sequence[str] | None,
     others: Mapping[str, Strategy] = _NO_OTHERS,
 ) -> list[str]:
-    """The strategies to run on a car: those named, every one that fits it, or the usual ones that do.
+    """The strategies to run on a car: those named; every one that fits it, or the usual ones that do, and of the
+    others those that are usual.
 
     Without NOx data, only what is named cuts NOx. DataError for a name that is none.
     """
@@ -116,7 +141,8 @@ def strategies_for(
             strategy_named(name, others)
         return list(wanted)
     names = fitting(car.marks, every=wanted is not None)
-    return [name for name in names if car.engine.nox_known or not _cuts_nox(strategy_named(name))]
+    names = [name for name in names if car.engine.nox_known or not _cuts_nox(strategy_named(name))]
+    return [*names, *(name for name, other in others.items() if other.usual and name not in names)]
 
 
 def _cuts_nox(strategy: Strategy) -> bool:

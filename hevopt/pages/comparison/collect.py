@@ -119,6 +119,9 @@ class Collector:
             failures={
                 name: without_folders(str(error)) for name, error in comparison.failures.items()
             },
+            peeking={
+                f"{car} {strategy}": why for (car, strategy), why in comparison.peeking.items()
+            },
             lost_proofs={
                 name: without_folders(why) for name, why in comparison.lost_proofs.items()
             },

@@ -200,6 +200,7 @@ class Results(FileModel):
     end_asked: car -> state of charge asked at the end, where it is another than the start's
     inputs: file -> SHA-256; versions: name -> version; failures: architecture, or it and strategy -> message
     lost_proofs: architecture and kind of proof -> why it was tried and not found
+    peeking: car and strategy -> what shows that a strategy from outside knows more of the cycle than it says
     """
 
     format: Literal["hevopt comparison 2"] = FORMAT
@@ -219,6 +220,7 @@ class Results(FileModel):
     rows: list[SavedRow]
     failures: dict[str, str]
     lost_proofs: dict[str, str] = Field(default_factory=dict)
+    peeking: dict[str, str] = Field(default_factory=dict)
     published: list[PublishedFigure]
     pareto: list[ParetoFront] | None = None
     sensitivity: list[Sensitivity] | None = None

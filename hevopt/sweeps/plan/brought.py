@@ -63,11 +63,11 @@ def _place(
         error = unknown_name("strategy", printable(name), fit)
         raise DataError(f"{error}, or {FORMS}")
     place = located(check_name(name, STRATEGIES), folder)
-    _check_defined(place)
+    check_defined(place)
     return place, False
 
 
-def _check_defined(place: Located) -> None:
+def check_defined(place: Located) -> None:
     """DataError where a file has no such name at its top, told by its text alone."""
     if place.module:
         return

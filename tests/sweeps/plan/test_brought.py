@@ -14,7 +14,7 @@ from hevopt.sweeps.store.reading import open_to_read
 from hevopt.sweeps.workers.work import run_job
 
 RULE = """import numpy as np
-from hevopt import stepwise
+from hevopt import policy, stepwise
 
 def least_fuel(problem):
     return stepwise(problem, lambda now: np.argmin(np.where(now.usable, now.fuel_kg, np.inf)))
@@ -22,7 +22,9 @@ def least_fuel(problem):
 def broken(problem):
     return 1 / 0
 
-least_again = least_fuel
+@policy
+def least_again(now):
+    return np.argmin(np.where(now.usable, now.fuel_kg, np.inf))
 """
 
 
