@@ -49,8 +49,8 @@ def result(comparison: Comparison, about: Mapping[str, Any]) -> dict[str, Any]:
     """
     rows = [row.as_dict() for row in comparison.rows]
     lost = {"lost_proofs": dict(comparison.lost_proofs)} if comparison.lost_proofs else {}
-    peeking = {f"{car} {name}": why for (car, name), why in comparison.peeking.items()}
-    marks = {"causal": sorted(comparison.causal), **({"peeking": peeking} if peeking else {})}
+    peeking = {"peeking": comparison.peeking_by_row} if comparison.peeking else {}
+    marks = {"causal": sorted(comparison.causal), **peeking}
     return {"cycle": comparison.cycle, "rows": rows, **marks, **lost, **about}
 
 

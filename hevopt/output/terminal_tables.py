@@ -171,8 +171,8 @@ def _end_notes(comparison: Comparison) -> str:
 def _peeking_note(comparison: Comparison) -> str:
     """What shows that strategies know more of the cycle than they say, so that they are not marked."""
     return "".join(
-        f"not causal, {printable(f'{car} {strategy}: {why}')}.\n"
-        for (car, strategy), why in comparison.peeking.items()
+        f"not causal, {printable(f'{row}: {why}')}.\n"
+        for row, why in comparison.peeking_by_row.items()
     )
 
 

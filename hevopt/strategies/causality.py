@@ -61,7 +61,7 @@ def _unfolding(problem: Problem, row: int) -> _Unfolding:
     """A problem of one row over and over, ready to show the others."""
     folded = with_rows(problem, np.full(len(problem.table.time_s), row))
     hidden = []
-    places = [(folded.table, problem.table), (folded, problem)]
+    places: list[tuple[Any, Any]] = [(folded.table, problem.table), (folded, problem)]
     if problem.table.signals is not None:
         places.append((folded.table.signals, problem.table.signals))
     for place, true in places:

@@ -68,6 +68,11 @@ class Comparison(Shown):
         rows = len(self.rows)
         return {"cycle": self.cycle, "rows": rows, "failed": failed, "reference": self.reference}
 
+    @property
+    def peeking_by_row(self) -> dict[str, str]:
+        """`peeking`, car and strategy as one text."""
+        return {f"{car} {strategy}": why for (car, strategy), why in self.peeking.items()}
+
     def _repr_html_(self) -> str:
         facts = [row._facts() for row in self.rows]
         heads = list(facts[0]) if facts else []

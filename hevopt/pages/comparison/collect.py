@@ -119,9 +119,7 @@ class Collector:
             failures={
                 name: without_folders(str(error)) for name, error in comparison.failures.items()
             },
-            peeking={
-                f"{car} {strategy}": why for (car, strategy), why in comparison.peeking.items()
-            },
+            peeking=comparison.peeking_by_row,
             lost_proofs={
                 name: without_folders(why) for name, why in comparison.lost_proofs.items()
             },
