@@ -171,10 +171,7 @@ def compare_cars(
     others: Mapping[str, Strategy] = _NO_OTHERS,
     watch: Watch = _NOBODY,
 ) -> Comparison:
-    """The strategies of the settings on cars in which the settings are made already; see `compare`.
-
-    others: strategies beside those shipped and registered
-    """
+    """`compare` on cars in which the settings are made already; others: strategies beside those that are known."""
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
