@@ -17,7 +17,7 @@ from hevopt.errors import comes_from_interrupt
 from hevopt.problem.arrays import Indices
 from hevopt.problem.problem import Problem
 from hevopt.problem.rows import with_rows
-from hevopt.strategies.policy import Asked, asked_of, asking
+from hevopt.strategies.policy import Declared, asked_of, asking
 from hevopt.strategies.stepper import driven
 from hevopt.strategies.stepwise import AskedRule
 
@@ -94,7 +94,7 @@ class _Shown:
 
 
 def _policy_peeks(
-    problem: Problem, control: Indices, function: Callable[..., Any], asked: Asked, row: int
+    problem: Problem, control: Indices, function: Callable[..., Any], asked: Declared, row: int
 ) -> str | None:
     """What shows that a policy knows the rows after its preview: one row of the table takes the place of these."""
     folded, steps = _unfolding(problem, row), len(control) - 1 - asked.preview
@@ -113,7 +113,7 @@ def _policy_peeks(
     return None
 
 
-def _again(problem: Problem, function: Callable[..., Any], asked: Asked, step: int) -> Indices:
+def _again(problem: Problem, function: Callable[..., Any], asked: Declared, step: int) -> Indices:
     return driven(problem, asking(problem, function, asked), step + 1)[0]
 
 

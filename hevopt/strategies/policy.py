@@ -12,7 +12,7 @@ _MARK = "_hevopt_policy"
 Rule = TypeVar("Rule", bound=Callable[..., Any])
 
 
-class Asked(NamedTuple):
+class Declared(NamedTuple):
     """What a policy has declared. preview: steps after the present one that it is shown"""
 
     preview: int = 0
@@ -36,7 +36,7 @@ def policy(rule: Rule | None = None, *, preview: int = 0) -> Rule | Callable[[Ru
 
     def marked(what: Rule) -> Rule:
         try:
-            setattr(what, _MARK, Asked(preview))
+            setattr(what, _MARK, Declared(preview))
         except AttributeError:
             raise DataError(
                 f"policy: a {type(what).__name__} cannot be marked; needed: a function or a class"
@@ -46,13 +46,13 @@ def policy(rule: Rule | None = None, *, preview: int = 0) -> Rule | Callable[[Ru
     return marked if rule is None else marked(rule)
 
 
-def asked_of(function: Any) -> Asked | None:
+def asked_of(function: Any) -> Declared | None:
     """What a function has declared to know as a policy; None where it is none, and gets the whole Problem."""
     declared = getattr(function, _MARK, None)
-    return declared if isinstance(declared, Asked) else None
+    return declared if isinstance(declared, Declared) else None
 
 
-def asking(problem: Problem, rule: Callable[..., Any], asked: Asked) -> AskedRule:
+def asking(problem: Problem, rule: Callable[..., Any], asked: Declared) -> AskedRule:
     """A policy as a stepper of a problem, a class made anew."""
     own = rule() if isinstance(rule, type) else rule
     if not callable(own):
