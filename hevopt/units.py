@@ -124,6 +124,13 @@ _SPELLINGS: dict[str, dict[str, float]] = {
         "g/MJ": 1e-9,
         "lb/hph lb/hphr lb/hp-h lb/hp-hr": 0.45359237 / (745.6998715822702 * 3600),
     },
+    "current": {"A ampere amperes amp amps": 1.0, "mA": 1e-3, "kA": 1e3},
+    "voltage": {"V volt volts": 1.0, "mV": 1e-3, "kV": 1e3},
+    "charge": {"As": 1.0, "Ah": 3600.0, "mAh": 3.6},
+    "resistance": {"ohm ohms Ω": 1.0, "mohm mohms mΩ milliohm": 1e-3, "µohm µΩ μohm μΩ": 1e-6},
+    # Of one offset each, which is not a factor: whoever reads one asks which of both it is.
+    "celsius": {"°C degC celsius": 1.0},
+    "kelvin": {"K kelvin": 1.0},
     "energy": {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "Wh": 3600.0, "kWh": 3.6e6},
     "fraction": {
         "fraction - 1 ratio m/m rise/run": 1.0,

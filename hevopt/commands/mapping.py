@@ -18,12 +18,12 @@ from hevopt.commands.terminal import write
 from hevopt.errors import DataError
 from hevopt.files.shown import printable
 
-maps_app = typer.Typer(help="Measured maps of engines and machines.", rich_markup_mode=None)
+maps_app = typer.Typer(help="Measured maps and tests of components.", rich_markup_mode=None)
 
 
 @maps_app.callback()
 def _maps() -> None:
-    """Measured maps of engines and machines."""
+    """Measured maps and tests of components."""
 
 
 @maps_app.command("import")
@@ -32,8 +32,10 @@ def import_map(
         Path, typer.Argument(help="Table of the points, a grid, or a .mat file of axes and matrix.")
     ],
     kind: Annotated[
-        Literal["engine", "machine", "compressor", "turbine"],
-        typer.Option("--kind", help="engine, machine, or an engine's compressor or turbine."),
+        Literal["engine", "machine", "battery", "compressor", "turbine"],
+        typer.Option(
+            "--kind", help="engine, machine, battery, or an engine's compressor or turbine."
+        ),
     ],
     like: LikeOption = None,
     out: Annotated[
@@ -70,8 +72,27 @@ def import_map(
             help="What a compressor's or turbine's flow and speed are corrected to, such as 298.15,1.013.",
         ),
     ] = None,
+    start_soc: Annotated[
+        float | None,
+        typer.Option(
+            "--start-soc",
+            help="State of charge, 0 to 1, at a battery test's first row, where no column has it.",
+        ),
+    ] = None,
+    temperature: Annotated[
+        float | None,
+        typer.Option(
+            "--temperature",
+            metavar="DEGC",
+            help="Which of the temperatures measured a battery's file is of; without this that nearest to 25 °C.",
+        ),
+    ] = None,
 ) -> None:
-    """A component file, with what the map covers, from measured points of an engine or a machine.
+    """A component file, and what it covers, from measurements of an engine, a machine or a battery.
+
+    A battery's test is a table of time, current and voltage, with state of charge or the charge that passes, of
+    pulses or constant current; or a table of curves: state of charge, open-circuit voltage, resistance of either
+    direction.
 
     A compressor or turbine goes into the mean_value part of the engine that --like names, as the compact map
     nearest to its points of corrected flow and speed, pressure ratio and efficiency; a turbine may have vane
@@ -96,7 +117,8 @@ def import_map(
     found = measured_map(
         file, kind, like=like, full_load=full_load, motoring=motoring, nox=nox,
         columns=pairs("--column", column, roles_of(kind)), units=pairs("--unit", unit, roles_of(kind)),
-        rows=rows, sheet=sheet, values=values, reference=_reference(reference),
+        rows=rows, sheet=sheet, values=values, reference=_reference(reference), start_soc=start_soc,
+        temperature_c=temperature,
     )  # fmt: skip
     plot, imported = found.write(out), found.imported
     for note in imported.notes:

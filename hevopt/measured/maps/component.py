@@ -10,6 +10,9 @@ from hevopt.display.facts import Shown
 from hevopt.errors import DataError, unknown_name
 from hevopt.files.shown import shown
 from hevopt.files.writing import check_outs, write_whole
+from hevopt.measured.battery.component import ImportedBattery, import_battery
+from hevopt.measured.battery.figure import battery_figure
+from hevopt.measured.battery.samples import ROLES as BATTERY_ROLES
 from hevopt.measured.maps.engine import import_engine
 from hevopt.measured.maps.machine import import_machine
 from hevopt.measured.maps.plot import map_figure
@@ -24,6 +27,15 @@ from hevopt.measured.maps.turbo_points import ROLES as TURBO_ROLES
 from hevopt.measured.sources import digests, own_file
 
 _IMPORTS = {"engine": import_engine, "machine": import_machine}
+_CURVES = ("--full-load", "--motoring", "--nox", "--rows")
+# kind -> options that it alone, or with others, has; what its columns may be
+_OPTIONS_OF = {
+    "engine": _CURVES,
+    "machine": _CURVES,
+    "battery": ("--start-soc", "--temperature"),
+    **dict.fromkeys(TURBO_KINDS, ("--reference",)),
+}
+_ROLES_OF = {"battery": BATTERY_ROLES, **dict.fromkeys(TURBO_KINDS, TURBO_ROLES)}
 # First line of every component that an import writes, by which the next import knows it.
 _HEAD = "Measured map, written by hevopt maps import."
 
@@ -37,7 +49,7 @@ class MapComponent(Shown):
     sources: the files that were read
     """
 
-    imported: ImportedMap | ImportedTurbo
+    imported: ImportedMap | ImportedTurbo | ImportedBattery
     coverage: tuple[str, ...]
     text: str
     sources: tuple[Path, ...]
@@ -50,14 +62,18 @@ class MapComponent(Shown):
         """
         path = Path(out)
         plot = check_map_file(path, self.sources)
-        imported = self.imported
-        if isinstance(imported, ImportedTurbo):
-            picture = turbo_figure(imported)
-        else:
-            picture = map_figure(imported)
+        picture = _picture(self.imported)
         write_whole(path, self.text.encode())
         write_whole(plot, picture)
         return plot
+
+
+def _picture(imported: ImportedMap | ImportedTurbo | ImportedBattery) -> bytes:
+    if isinstance(imported, ImportedTurbo):
+        return turbo_figure(imported)
+    if isinstance(imported, ImportedBattery):
+        return battery_figure(imported.file.name, imported.curves)
+    return map_figure(imported)
 
 
 def import_map(
@@ -74,30 +90,45 @@ def import_map(
     sheet: str | None = None,
     values: Mapping[str, Any] | None = None,
     reference: tuple[float, float] | None = None,
+    start_soc: float | None = None,
+    temperature_c: float | None = None,
 ) -> MapComponent:
-    """A component from measured points of an engine, a machine, or of a compressor or turbine in an engine.
+    """A component from measured points of an engine, a machine, a battery, or an engine's compressor or turbine.
 
-    file: table of the points, of engine and machine also a grid or a .mat file of axes and matrix
-    kind: "engine", "machine", "compressor" or "turbine"
+    file: table of the points, of engine and machine also a grid or a .mat file of axes and matrix; of a battery a
+    test in time (time, current, voltage, and soc or charge) or curves over charge
+    kind: "engine", "machine", "battery", "compressor" or "turbine"
     reference: of a compressor or turbine: temperature in K and pressure in Pa to which flow and speed are corrected
+    start_soc: of a battery: its state of charge at the first row, where no column has it
+    temperature_c: of a battery: which of the temperatures measured the component is of
     like: name or file of a component that gives the remaining keys; values: key of the component -> value
     full_load, motoring, nox: FILE or FILE#SHEET of the full-load curve, the motoring curve, and NOx where `file`
     has none
     columns, units: role (speed, torque, fuel, specific, efficiency, nox, loss, electric, full, motoring;
-    of a compressor or turbine speed, flow, ratio, efficiency, vanes) -> name of a column, its unit
+    of a compressor or turbine speed, flow, ratio, efficiency, vanes; of a battery time, current, voltage, soc,
+    charge, temperature, open_circuit, resistance, discharge, charging) -> name of a column, its unit
     rows: "speed" or "torque", what a grid's first column holds; sheet: of a workbook
     Raises DataError where something is missing or wrong, with its place.
     """
-    turbo = kind in TURBO_KINDS
-    _refuse_others(turbo, kind, rows, reference, full_load, motoring, nox)
+    _refuse_others(
+        kind,
+        {"--reference": reference, "--start-soc": start_soc, "--temperature": temperature_c,
+         "--full-load": full_load, "--motoring": motoring, "--nox": nox, "--rows": rows},
+    )  # fmt: skip
     if rows not in (None, "speed", "torque"):
         raise DataError(f"rows = {shown(rows)}; allowed: speed, torque")
     for what, given in (("columns", columns), ("units", units)):
         for role in given or {}:
             if role not in roles_of(kind):
                 raise DataError(f"{what}: {unknown_name('role', role, list(roles_of(kind)))}")
-    if turbo:
+    if kind in TURBO_KINDS:
         return _turbo(Path(file), kind, like, columns, units, sheet, values, reference)
+    if kind == "battery":
+        battery = import_battery(
+            Path(file), like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
+            start_soc=start_soc, temperature_c=temperature_c,
+        )  # fmt: skip
+        return _whole(battery, Path(file), like)
     path, extra = Path(file), {"full": full_load, "motoring": motoring, "nox": nox}
     source = Source(path, sheet, columns or {}, units or {}, rows)
     others = {
@@ -113,22 +144,17 @@ def import_map(
 
 def roles_of(kind: str) -> tuple[str, ...]:
     """What the columns of a map may be."""
-    return TURBO_ROLES if kind in TURBO_KINDS else ROLES
+    return _ROLES_OF.get(kind, ROLES)
 
 
-def _refuse_others(
-    turbo: bool, kind: str, rows: str | None, reference: tuple[float, float] | None, *curves: str | Path | None
-) -> None:  # fmt: skip
-    """DataError for a kind that is none, and for what belongs to another."""
-    if kind not in _IMPORTS and not turbo:
-        raise unknown_name("kind", kind, [*_IMPORTS, *TURBO_KINDS])
-    if reference is not None and not turbo:
-        raise DataError(f"--reference is for a compressor or turbine, not for {kind}; leave it out")
-    if turbo and (rows is not None or any(curve is not None for curve in curves)):
-        raise DataError(
-            f"--full-load, --motoring, --nox and --rows are for engines and machines, not for a {kind}; leave them "
-            "out"
-        )
+def _refuse_others(kind: str, given: Mapping[str, Any]) -> None:
+    """DataError for a kind that is none, and for options that belong to another. given: option -> value"""
+    if kind not in _OPTIONS_OF:
+        raise unknown_name("kind", kind, list(_OPTIONS_OF))
+    for option, value in given.items():
+        if value is not None and option not in _OPTIONS_OF[kind]:
+            own = [other for other, options in _OPTIONS_OF.items() if option in options]
+            raise DataError(f"{option} is for {' and '.join(own)}, not for a {kind}; leave it out")
 
 
 def _turbo(
@@ -140,7 +166,12 @@ def _turbo(
         path, kind, like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
         reference=reference,
     )  # fmt: skip
-    head = [_HEAD, *digests([path]), f"Other keys from {like}.", *found.notes, *found.said]
+    return _whole(found, path, like)
+
+
+def _whole(found: ImportedTurbo | ImportedBattery, path: Path, like: str | None) -> MapComponent:
+    others = [f"Other keys from {like}."] if like is not None else []
+    head = [_HEAD, *digests([path]), *others, *found.notes, *found.said]
     text = component_text(head, found.contents, found.origins)
     return MapComponent(found, found.said, text, (path, *map(Path, own_file(like))))
 

@@ -1,0 +1,1 @@
+"""Batteries from their tests: open-circuit voltage and resistance over charge, direction and temperature."""

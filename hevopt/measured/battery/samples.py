@@ -1,0 +1,335 @@
+"""A battery's test as a table has it: time, current and voltage, or curves over charge made of them elsewhere.
+
+Which sign of current discharges is told by the voltage, which falls where more is drawn; a state of charge comes
+from a column, or from the charge that passes.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hevopt.display.facts import Shown
+from hevopt.errors import DataError
+from hevopt.measured.tables.aliases import TIME
+from hevopt.measured.tables.packed_clock import as_clock
+from hevopt.measured.tables.rows import runs
+from hevopt.measured.tables.table import Measured, asked_column, columns_found, read_measured
+from hevopt.measured.tables.units import in_si
+
+Array = NDArray[np.float64]
+
+# role -> names without units that mean it, small letters and digits
+ALIASES = {
+    "time": set().union(*TIME),
+    "current": {"current", "i", "batterycurrent", "packcurrent", "cellcurrent", "ibat", "ibatt", "strom", "amps"},
+    "voltage": {
+        "voltage", "v", "u", "batteryvoltage", "packvoltage", "cellvoltage", "terminalvoltage", "ubat", "vbat",
+        "vbatt", "spannung",
+    },
+    "soc": {"soc", "stateofcharge", "socfraction", "ladezustand"},
+    "charge": {"charge", "ah", "q", "amperehours", "amphours", "ampereh", "capacity", "chargedrawn", "ladung"},
+    "temperature": {
+        "temperature", "temp", "celltemperature", "batterytemperature", "packtemperature", "temperatur",
+    },
+    "open_circuit": {"ocv", "voc", "uoc", "opencircuitvoltage", "emf", "ruhespannung"},
+    "resistance": {"resistance", "r", "internalresistance", "ri", "rint", "dcr", "dcir", "innenwiderstand"},
+    "discharge": {
+        "resistancedischarge", "dischargeresistance", "rdischarge", "rdis", "rdch", "dischargeohm", "essrdis",
+    },
+    "charging": {"resistancecharge", "chargeresistance", "rcharge", "rchg", "rch", "chargeohm", "essrchg"},
+}  # fmt: skip
+ROLES = tuple(ALIASES)
+_QUANTITIES = {
+    "time": ("time",),
+    "current": ("current",),
+    "voltage": ("voltage",),
+    "soc": ("fraction",),
+    "charge": ("charge",),
+    "temperature": ("celsius", "kelvin"),
+    "open_circuit": ("voltage",),
+    "resistance": ("resistance",),
+    "discharge": ("resistance",),
+    "charging": ("resistance",),
+}
+_CURVES = ("open_circuit", "resistance", "discharge", "charging")
+_ZERO_CELSIUS_K = 273.15
+# Share of the largest current by which a change counts as a step.
+STEP = 0.05
+# A longer step, in seconds and in usual steps, parts two runs.
+_GAP_S, _GAP_STEPS = 60.0, 20.0
+# By how much, as a share, a column of charge may differ from the current's integral.
+_CHARGE_OFF = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BatterySamples(Shown):
+    """A test in time; arrays (row,). current_a > 0 discharges; temperature_c: None where no column has it."""
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    soc: Array
+    temperature_c: Array | None
+    capacity_as: float
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BatteryCurves(Shown):
+    """Curves over charge as a table has them; arrays (row,)."""
+
+    soc: Array
+    open_circuit_v: Array
+    discharge_ohm: Array
+    charge_ohm: Array
+    temperature_c: Array | None
+    lines: NDArray[np.int64]
+    notes: tuple[str, ...]
+
+
+def read_test(
+    path: Path, sheet: str | None, columns: Mapping[str, str], units: Mapping[str, str],
+    start_soc: float | None, capacity_ah: float | None,
+) -> BatterySamples | BatteryCurves:  # fmt: skip
+    """The table of a test; DataError where something is missing or wrong.
+
+    start_soc: state of charge at the first row, where no column has it; capacity_ah: of what was tested
+    """
+    measured = read_measured(path, sheet=sheet)
+    values, notes = _values(measured, columns, units)
+    if "open_circuit" in values:
+        if start_soc is not None:
+            raise DataError(
+                f"{measured.path}: --start-soc is for a test in time, and this table holds curves over charge; "
+                "leave it out"
+            )
+        return _curves(measured, values, notes)
+    for role in ("time", "current", "voltage"):
+        if role not in values:
+            raise DataError(
+                f"{measured.path}: no column of {role} found, which a battery's test needs beside "
+                f"{'current and voltage' if role == 'time' else 'time'} (or curves: soc, open_circuit and "
+                f"resistance, or discharge and charging); name it with --column {role}=NAME; "
+                f"{columns_found(measured)}"
+            )
+    _check_times(measured, values["time"])
+    current = _discharging(measured, values, notes)
+    soc, capacity_as = _soc(measured, values, current, start_soc, capacity_ah, notes)
+    return BatterySamples(
+        values["time"], current, values["voltage"], soc, values.get("temperature"), capacity_as,
+        measured.lines, tuple(notes),
+    )  # fmt: skip
+
+
+def _values(
+    measured: Measured, columns: Mapping[str, str], units: Mapping[str, str]
+) -> tuple[dict[str, Array], list[str]]:
+    """Every role's column in SI, temperatures in °C, and how each was read."""
+    values, notes = dict[str, Array](), list(measured.notes)
+    for role in ALIASES:
+        column = asked_column(measured, role, columns, ALIASES[role])
+        if column is None:
+            if role in units:
+                raise DataError(
+                    f"{measured.path}: --unit {role}, and there is no column of it; name it with --column "
+                    f"{role}=NAME; {columns_found(measured)}"
+                )
+            continue
+        column = as_clock(column) if role == "time" else column
+        found = in_si(measured, column, _QUANTITIES[role], f"--unit {role}=UNIT", units.get(role))
+        cold = _ZERO_CELSIUS_K if found.quantity == "kelvin" else 0.0
+        values[role] = found.values - cold
+        notes.append(f"{role}: {found.note}")
+    of_curves = "open_circuit" in values
+    for role in [r for r in values if of_curves and r in ("time", "current", "voltage", "charge")]:
+        if role in columns or role in units:
+            raise DataError(
+                f"{measured.path}: {role} is of a test in time, and this table has an open-circuit voltage, as "
+                "curves over charge do; name one of both alone"
+            )
+        del values[role]
+    for role in [r for r in values if not of_curves and r in _CURVES]:
+        del values[role]
+    _check_values(measured, values)
+    return values, notes
+
+
+def _check_values(measured: Measured, values: Mapping[str, Array]) -> None:
+    allowed = {
+        "voltage": (1e-6, np.inf, "above 0 V"),
+        "open_circuit": (1e-6, np.inf, "above 0 V"),
+        "soc": (-1e-9, 1 + 1e-9, "0 to 1, which is 100 %"),
+        "resistance": (0.0, np.inf, "0 ohm or more"),
+        "discharge": (0.0, np.inf, "0 ohm or more"),
+        "charging": (0.0, np.inf, "0 ohm or more"),
+        "temperature": (-100.0, 200.0, "-100 to 200 °C"),
+    }
+    for role, found in values.items():
+        low, high, words = allowed.get(role, (-np.inf, np.inf, "a number"))
+        bad = ~(np.isfinite(found) & (found >= low) & (found <= high))
+        if bad.any():
+            k = int(np.argmax(bad))
+            what = f"{role} {found[k]:.4g}" if np.isfinite(found[k]) else f"no {role}"
+            raise DataError(
+                f"{measured.path}, {runs(list(measured.lines[bad]))}: {what}; allowed: {words}; correct the cells "
+                "or delete the rows"
+            )
+
+
+def _curves(measured: Measured, values: Mapping[str, Array], notes: list[str]) -> BatteryCurves:
+    if "soc" not in values:
+        raise DataError(
+            f"{measured.path}: no column of soc found, which curves over charge need; name it with --column "
+            f"soc=NAME; {columns_found(measured)}"
+        )
+    both = values.get("resistance")
+    discharge, charge = values.get("discharge", both), values.get("charging", both)
+    if discharge is None or charge is None:
+        raise DataError(
+            f"{measured.path}: no column of {'discharge' if discharge is None else 'charging'} resistance found; "
+            "name discharge and charging, or resistance for both, with --column ROLE=NAME; "
+            f"{columns_found(measured)}"
+        )
+    if both is discharge or both is charge:
+        notes.append(
+            "resistance: one column, for both directions where they have none of their own"
+        )
+    return BatteryCurves(
+        values["soc"], values["open_circuit"], discharge, charge, values.get("temperature"),
+        measured.lines, tuple(notes),
+    )  # fmt: skip
+
+
+def _check_times(measured: Measured, time_s: Array) -> None:
+    back = np.diff(time_s) < 0
+    if back.any():
+        raise DataError(
+            f"{measured.path}, {runs(list(measured.lines[1:][back]))}: time goes back; sort the rows, or import "
+            "one test at a time"
+        )
+    if len(time_s) < 3 or time_s[-1] <= time_s[0]:
+        raise DataError(f"{measured.path}: {len(time_s)} rows; a test needs three or more in time")
+
+
+def _discharging(measured: Measured, values: Mapping[str, Array], notes: list[str]) -> Array:
+    """The current with the sign that discharges as above 0."""
+    current, voltage = values["current"], values["voltage"]
+    most = float(np.abs(current).max())
+    if most == 0:
+        raise DataError(f"{measured.path}: no current flows in this test; check its column")
+    change, near = np.diff(current), _near(values["time"])
+    stepping = near & (np.abs(change) > STEP * most)
+    told = -float(np.sum((np.diff(voltage) * change)[stepping]))
+    by = "voltage falls where it steps up"
+    if told == 0:
+        told = -float(np.sum((np.diff(voltage) * (current[1:] + current[:-1]))[near]))
+        by = "voltage falls while it flows"
+    if "soc" in values:
+        flow = np.diff(_passed(values["time"], current))
+        by_soc = -float(np.sum((np.diff(values["soc"]) * flow)[near]))
+        if told * by_soc < 0:
+            raise DataError(
+                f"{measured.path}: the voltage says that current of one sign discharges, the column of soc that of "
+                "the other; check both columns"
+            )
+        told, by = (told, by) if told else (by_soc, "state of charge falls with it")
+    if told == 0:
+        raise DataError(
+            f"{measured.path}: neither voltage nor charge tells which sign of current discharges; a test with "
+            "steps of current is needed"
+        )
+    notes.append(f"current: {'above' if told > 0 else 'below'} 0 discharges, as the {by}")
+    return current if told > 0 else -current
+
+
+def _near(time_s: Array) -> NDArray[np.bool_]:
+    """(row - 1,) steps that are no gap between one run and the next."""
+    steps = np.diff(time_s)
+    near: NDArray[np.bool_] = steps <= max(_GAP_S, _GAP_STEPS * float(np.median(steps)))
+    return near
+
+
+def _passed(time_s: Array, current: Array) -> Array:
+    """(row,) charge that has passed since the first row, As."""
+    steps = np.diff(time_s) * (current[1:] + current[:-1]) / 2
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _soc(
+    measured: Measured, values: Mapping[str, Array], current: Array, start_soc: float | None,
+    capacity_ah: float | None, notes: list[str],
+) -> tuple[Array, float]:  # fmt: skip
+    """(row,) state of charge, and the capacity in As."""
+    drawn = _passed(values["time"], current)
+    if "soc" in values:
+        if start_soc is not None:
+            raise DataError(f"{measured.path}: both a column of soc and --start-soc; leave one out")
+        near = _near(values["time"])
+        return values["soc"], _capacity(measured, values["soc"], drawn, near, capacity_ah, notes)
+    missing = [
+        option
+        for option, given in (("--start-soc", start_soc), ("--set capacity_ah=VALUE", capacity_ah))
+        if given is None
+    ]
+    if missing:
+        raise DataError(
+            f"{measured.path}: no column of soc found; name it with --column soc=NAME, or give "
+            f"{' and '.join(missing)}, from which it is counted"
+        )
+    assert start_soc is not None and capacity_ah is not None
+    if not 0 <= start_soc <= 1:
+        raise DataError(f"--start-soc {start_soc:g}; allowed: 0 to 1, which is 100 %")
+    what = "the current's integral"
+    if "charge" in values:
+        drawn, what = _counted(measured, values["charge"], drawn), "the column of charge"
+    soc = start_soc - drawn / (capacity_ah * 3600)
+    if soc.min() < -0.02 or soc.max() > 1.02:
+        raise DataError(
+            f"{measured.path}: by {what} the state of charge goes from {soc.max():.3g} to {soc.min():.3g}, beyond "
+            f"0 to 1; check --start-soc {start_soc:g}, capacity_ah {capacity_ah:g} and the sensor's offset"
+        )
+    notes.append(f"soc: {start_soc:g} at the first row, then by {what} over {capacity_ah:g} Ah")
+    return np.clip(soc, 0.0, 1.0), capacity_ah * 3600
+
+
+def _counted(measured: Measured, charge: Array, drawn: Array) -> Array:
+    """Charge drawn since the first row by its column, whichever sign it has; DataError where it starts anew."""
+    steps, flow = np.diff(charge), np.diff(drawn)
+    steps = steps * (1.0 if np.sum(steps * flow) >= 0 else -1.0)
+    if np.abs(steps - flow).sum() > _CHARGE_OFF * np.abs(flow).sum():
+        raise DataError(
+            f"{measured.path}: the column of charge does not follow the current's integral ("
+            f"{steps.sum() / 3600:.4g} against {flow.sum() / 3600:.4g} Ah), as one does that starts anew at every "
+            "step; leave it out, or name another with --column charge=NAME"
+        )
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _capacity(
+    measured: Measured, soc: Array, drawn: Array, near: NDArray[np.bool_], capacity_ah: float | None,
+    notes: list[str],
+) -> float:  # fmt: skip
+    """As that a full battery holds: as given, else what of the current moves the column of soc, gaps left out."""
+    fallen, passed = (
+        np.cumsum(np.where(near, np.diff(v), 0.0)) for v in (-soc, drawn)
+    )  # fmt: skip
+    fallen, passed = fallen - fallen.mean(), passed - passed.mean()
+    spread = float(np.sum(fallen**2))
+    found = float(np.sum(passed * fallen)) / spread if spread > 0 else 0.0
+    if capacity_ah is not None:
+        if found > 0 and abs(found / 3600 / capacity_ah - 1) > _CHARGE_OFF:
+            notes.append(
+                f"WARNING: current and soc give a capacity of {found / 3600:.4g} Ah, not {capacity_ah:g} as given"
+            )
+        return capacity_ah * 3600
+    if found <= 0 or np.ptp(soc) < 0.1:
+        raise DataError(
+            f"{measured.path}: the capacity cannot be told from current and soc, which moves by {np.ptp(soc):.3g}; "
+            "give --set capacity_ah=VALUE"
+        )
+    notes.append(f"capacity: {found / 3600:.4g} Ah, by which the current moves the column of soc")
+    return found
