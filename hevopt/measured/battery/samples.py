@@ -116,6 +116,7 @@ def read_test(
                 f"resistance, or discharge and charging); name it with --column {role}=NAME; "
                 f"{columns_found(measured)}"
             )
+    _check_values(measured, values)
     _check_times(measured, values["time"])
     current = _discharging(measured, values, notes)
     soc, capacity_as = _soc(measured, values, current, start_soc, capacity_ah, notes)
@@ -154,7 +155,6 @@ def _values(
         del values[role]
     for role in [r for r in values if not of_curves and r in _CURVES]:
         del values[role]
-    _check_values(measured, values)
     return values, notes
 
 
@@ -194,6 +194,7 @@ def _curves(measured: Measured, values: Mapping[str, Array], notes: list[str]) -
             "name discharge and charging, or resistance for both, with --column ROLE=NAME; "
             f"{columns_found(measured)}"
         )
+    _check_values(measured, values)
     if both is discharge or both is charge:
         notes.append(
             "resistance: one column, for both directions where they have none of their own"
