@@ -14,13 +14,14 @@ that is eta where power enters on the side of the joint's sense, else 1 / eta:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.car.gear_loss import GearLoss
 from hevopt.car.linear import Coefficient
 from hevopt.display.facts import Shown
 
@@ -39,6 +40,7 @@ class Joint(Shown):
     reaction: shaft -> (c0, c1), torque (c0 + c1 h) lambda on it
     sense: shaft -> coefficient; lambda x (sense . w) is the power that enters
     pushes: whether lambda may not be negative
+    lost: torque that is lost over gear, speed and lambda, taken from the output, and the gear, or one per step
     """
 
     name: str
@@ -48,10 +50,17 @@ class Joint(Shown):
     sense: Mapping[str, Coefficient]
     efficiency: Coefficient = 1.0
     pushes: bool = False
+    lost: tuple[GearLoss, int | NDArray[np.int64]] | None = None
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Input and output of a pair of gears or a gearbox."""
+        first, second = self.reaction
+        return first, second
 
     @property
     def lossless(self) -> bool:
-        """Whether it passes on all power that enters."""
+        """Whether it passes on all power that enters, but for what `lost` says."""
         return bool(np.all(np.asarray(self.efficiency) == 1.0))
 
 
@@ -85,6 +94,7 @@ class Gearbox:
 
     ratios, efficiencies: by number of the gear, 0 being neutral; gears: the numbers that it has
     shift_fuel_kg: what a change that the strategy chooses counts
+    loss: what is lost over gear, speed and torque, in place of efficiencies, which are 1 then
     """
 
     name: str
@@ -95,6 +105,7 @@ class Gearbox:
     gears: tuple[int, ...]
     choice: GearChoice
     shift_fuel_kg: float = 0.0
+    loss: GearLoss | None = None
 
     @property
     def shafts(self) -> tuple[str, ...]:
@@ -106,7 +117,8 @@ class Gearbox:
         ratio, efficiency = np.array(self.ratios)[gear], np.array(self.efficiencies)[gear]
         if np.ndim(gear) == 0:
             ratio, efficiency = float(ratio), float(efficiency)
-        return _geared(self.name, "gearbox", self.first, self.second, ratio, efficiency)
+        found = _geared(self.name, "gearbox", self.first, self.second, ratio, efficiency)
+        return found if self.loss is None else replace(found, lost=(self.loss, gear))
 
 
 @dataclass(frozen=True, slots=True)

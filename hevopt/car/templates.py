@@ -204,4 +204,5 @@ def _gearbox(data: GearboxData) -> Gearbox:
         tuple(map(float, data.efficiency)),
         numbers,
         "listed",
+        loss=data.loss,
     )

@@ -1,10 +1,11 @@
-"""Gearbox and final drive, equations (13) and (14): efficiency by the direction of power flow."""
+"""Gearbox and final drive, equations (13) and (14): efficiency by the direction of power flow, or losses."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.car.gear_loss import GearLoss
 from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
@@ -14,11 +15,12 @@ Array = NDArray[np.float64]
 class Gearbox(Shown):
     """Forward gears with the final drive; gear 0 is neutral.
 
-    ratios, efficiency: (gear + 1,) input to wheels, index 0 for neutral
+    ratios, efficiency: (gear + 1,) input to wheels, index 0 for neutral; efficiency 1 where loss says what is lost
     up_mps, down_mps: (gear - 1,) speeds of the change up from, and down to, gears 1, 2, ...
     shift_fuel_kg, engine_speed_min_radps: cost of a change and lowest engine speed above first gear, where the
     gear is a control; None where it cannot be one
     shift_gap_s: time without torque at a listed change of gear; 0 for a dual clutch gearbox
+    loss: torque lost over gear, speed and torque; None where one efficiency of each gear says it
     """
 
     name: str
@@ -30,6 +32,14 @@ class Gearbox(Shown):
     shift_fuel_kg: float | None = None
     engine_speed_min_radps: float = 0.0
     shift_gap_s: float = 0.0
+    loss: GearLoss | None = None
+
+    def needed_nm(self, gear: NDArray[np.int64], input_radps: Array, output_nm: Array) -> Array:
+        """(time,) torque at the input for one at the wheels, each in a gear and at a speed of the input."""
+        ratio = self.ratios[gear]
+        if self.loss is not None:
+            return self.loss.input_nm(gear, input_radps, output_nm / ratio)
+        return input_torque_nm(output_nm, ratio, self.efficiency[gear])
 
 
 def output_torque_nm(input_nm: Array, ratio: Array, efficiency: Array) -> Array:

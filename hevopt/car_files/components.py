@@ -7,6 +7,7 @@ import numpy as np
 from hevopt.car.braking import Braking
 from hevopt.car.engine import Engine
 from hevopt.car.engine_laws import CompactLaw, EngineMap, FuelCoefficients, NoxCoefficients
+from hevopt.car.gear_loss import GearLoss, LossInGear
 from hevopt.car.machine import Machine, TorqueCurve
 from hevopt.car.machine_laws import LossByCoefficients, LossByEfficiency, LossLaw, LossMap
 from hevopt.car.transmission import Gearbox
@@ -15,7 +16,7 @@ from hevopt.car_files.battery import BatteryFile, LinearVoltageFile
 from hevopt.car_files.car import BrakingFile, CarFile
 from hevopt.car_files.engine import EngineFile, EngineGridFile
 from hevopt.car_files.fields import FullLoadFile
-from hevopt.car_files.gearbox import GearboxFile
+from hevopt.car_files.gearbox import GearboxFile, GearLossFile
 from hevopt.car_files.machine import LossMapFile, MachineFile
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery
@@ -118,6 +119,9 @@ def gearbox_of(data: GearboxFile) -> Gearbox:
     """The gearbox of its file; gear 0, neutral, stands first."""
     gears, kmh, free = len(data.ratios), TO_SI["_kmh"][1], data.free_gear
     efficiency = data.efficiency if isinstance(data.efficiency, list) else [data.efficiency] * gears
+    loss = None
+    if data.loss_map is not None:
+        efficiency, loss = [1.0] * gears, GearLoss([_gear_loss(gear) for gear in data.loss_map])
     return Gearbox(
         data.name,
         np.array([1.0, *data.ratios]) * data.final_drive_ratio,
@@ -128,7 +132,13 @@ def gearbox_of(data: GearboxFile) -> Gearbox:
         None if free is None else free.shift_fuel_g * TO_SI["_g"][1],
         0.0 if free is None else free.engine_speed_min_rpm * TO_SI["_rpm"][1],
         data.shift_gap_s,
+        loss,
     )
+
+
+def _gear_loss(data: GearLossFile) -> LossInGear:
+    speed = np.array(data.speed_rpm) * TO_SI["_rpm"][1]
+    return LossInGear(speed, np.array(data.torque_nm), np.array(data.loss_nm))
 
 
 def machine_of(data: MachineFile) -> Machine:

@@ -2,9 +2,22 @@
 
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from hevopt.car_files.fields import Fraction, List, Name, Number, Positive, Ratio, Shape, ShiftFuel
+from hevopt.car_files.fields import (
+    Curve,
+    Fraction,
+    List,
+    Name,
+    Number,
+    Positive,
+    Ratio,
+    Shape,
+    ShiftFuel,
+    Speeds,
+    check_grid,
+)
 from hevopt.files.toml import FileModel
 
 
@@ -21,11 +34,38 @@ class FreeGearFile(FileModel):
     engine_speed_min_rpm: Annotated[float, Field(ge=0, le=10_000)]
 
 
+class GearLossFile(FileModel):
+    """Torque that one gear loses, final drive included, over speed and torque at the input."""
+
+    speed_rpm: Speeds
+    torque_nm: Curve
+    loss_nm: list[list[float]]
+
+    @model_validator(mode="after")
+    def _grid(self) -> Self:
+        for name, axis in (("speed_rpm", self.speed_rpm), ("torque_nm", self.torque_nm)):
+            if (np.diff(axis) <= 0).any():
+                raise ValueError(f"{name} must increase")
+        check_grid("loss_nm", self.loss_nm, len(self.speed_rpm), len(self.torque_nm))
+        rise = np.diff(np.array(self.loss_nm), axis=1) / np.diff(self.torque_nm)
+        if (rise >= 1).any():
+            i, j = np.argwhere(rise >= 1)[0]
+            raise ValueError(
+                f"loss_nm at {self.speed_rpm[i]:g} rpm rises by {rise[i, j]:.3g} Nm per Nm between "
+                f"{self.torque_nm[j]:g} and {self.torque_nm[j + 1]:g} Nm: more torque at the input would give less "
+                "at the output; allowed: below 1"
+            )
+        return self
+
+
 class GearboxFile(FileModel):
     name: Name
     ratios: Annotated[list[Ratio], Field(min_length=1, max_length=20)]
     final_drive_ratio: Ratio
-    efficiency: Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape]
+    efficiency: (
+        Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape] | None
+    ) = None
+    loss_map: list[GearLossFile] | None = None
     shift_gap_s: Annotated[float, Field(ge=0, le=5)] = 0.0
     shift_speeds: ShiftSpeedsFile
     free_gear: FreeGearFile | None = None
@@ -35,6 +75,12 @@ class GearboxFile(FileModel):
         gears, shifts = len(self.ratios), self.shift_speeds
         if isinstance(self.efficiency, list) and len(self.efficiency) != gears:
             raise ValueError(f"efficiency needs one value or {gears}, one per gear")
+        if (self.efficiency is None) == (self.loss_map is None):
+            raise ValueError("give either efficiency or loss_map, and not both")
+        if self.loss_map is not None and len(self.loss_map) != gears:
+            raise ValueError(
+                f"loss_map needs {gears} tables, one per gear in their order; found {len(self.loss_map)}"
+            )
         if len(shifts.up_kmh) != gears - 1 or len(shifts.down_kmh) != gears - 1:
             raise ValueError(f"shift_speeds need {gears - 1} values each for {gears} gears")
         return self

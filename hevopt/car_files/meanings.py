@@ -171,10 +171,17 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "ratios": ("-", "input speed over output speed of each gear, first gear first, falling"),
         "final_drive_ratio": ("-", "gearbox output speed over wheel speed"),
         "efficiency": ("-", "of gearbox and final drive together: one for all gears, or one per gear"),
+        "loss_map": ("", "in place of efficiency: one table per gear, in their order, of what gearbox and final "
+                     "drive lose; what lies outside is rejected"),
         "shift_gap_s": ("s", "time without torque at a change of gear that cycle or shift speeds list; 0: "
                         "the gearbox changes under load"),
         "shift_speeds": ("", "when the driver changes gear, on cycles that list none"),
         "free_gear": ("", "limits of a gear that the strategy chooses"),
+    },
+    "GearLossFile": {
+        "speed_rpm": ("1/min", "input speeds, rising; below the first the loss is that of the first"),
+        "torque_nm": ("Nm", "input torques, rising, below 0 in overrun"),
+        "loss_nm": ("Nm", "torque lost, referred to the input, a row per speed; nan where not measured"),
     },
     "ShiftSpeedsFile": {
         "up_kmh": ("km/h", "speed above which each gear but the last is left for the next"),

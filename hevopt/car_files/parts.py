@@ -99,7 +99,9 @@ def _gearbox(data: PartFile, gearbox: GearboxData | None) -> Gearbox:
             raise DataError(f"{data.name}: give its ratios, or the architecture a gearbox")
         numbers = tuple(range(1, len(gearbox.ratios)))
         ratios, efficiency = (tuple(map(float, v)) for v in (gearbox.ratios, gearbox.efficiency))
-        return Gearbox(data.name, first, second, ratios, efficiency, numbers, "listed")
+        return Gearbox(
+            data.name, first, second, ratios, efficiency, numbers, "listed", loss=gearbox.loss
+        )
     numbers = tuple(range(1, len(data.ratios) + 1))
     return Gearbox(
         data.name,

@@ -18,15 +18,23 @@ def component_text(
 
 
 def _table(contents: Mapping[str, Any], prefix: str, origins: Mapping[str, str]) -> list[str]:
-    """Keys of a table, then the tables in it."""
+    """Keys of a table, then the tables in it, and its lists of tables."""
     tables = {key: value for key, value in contents.items() if isinstance(value, Mapping)}
-    plain = {k: v for k, v in contents.items() if k not in tables and v is not None}
+    several = {key: value for key, value in contents.items() if _is_tables(value)}
+    plain = {k: v for k, v in contents.items() if k not in tables | several and v is not None}
     out = _keys(plain, prefix, origins)
     for name, table in tables.items():
         note = origins.get(prefix + name)
         out += ["", f"[{prefix}{name}]" + (f"  # {printable(note)}" if note else "")]
         out += _table(table, f"{prefix}{name}.", origins)
+    for name, each in several.items():
+        for table in each:
+            out += ["", f"[[{prefix}{name}]]", *_table(table, f"{prefix}{name}.", origins)]
     return out
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
 
 
 def _keys(table: Mapping[str, Any], prefix: str, origins: Mapping[str, str]) -> list[str]:

@@ -32,9 +32,10 @@ def import_map(
         Path, typer.Argument(help="Table of the points, a grid, or a .mat file of axes and matrix.")
     ],
     kind: Annotated[
-        Literal["engine", "machine", "battery", "compressor", "turbine"],
+        Literal["engine", "machine", "battery", "gearbox", "compressor", "turbine"],
         typer.Option(
-            "--kind", help="engine, machine, battery, or an engine's compressor or turbine."
+            "--kind",
+            help="engine, machine, battery, gearbox, or an engine's compressor or turbine.",
         ),
     ],
     like: LikeOption = None,
@@ -79,6 +80,13 @@ def import_map(
             help="State of charge, 0 to 1, at a battery test's first row, where no column has it.",
         ),
     ] = None,
+    side: Annotated[
+        Literal["input", "output"] | None,
+        typer.Option(
+            "--side",
+            help="Side of a gearbox that speed and torque are of, where their columns' names do not tell.",
+        ),
+    ] = None,
     temperature: Annotated[
         float | None,
         typer.Option(
@@ -88,11 +96,13 @@ def import_map(
         ),
     ] = None,
 ) -> None:
-    """A component file, and what it covers, from measurements of an engine, a machine or a battery.
+    """A component file, and what it covers, from measurements of an engine, a machine, a battery or a gearbox.
 
     A battery's test is a table of time, current and voltage, with state of charge or the charge that passes, of
     pulses or constant current; or a table of curves: state of charge, open-circuit voltage, resistance of either
     direction.
+
+    A gearbox's table has gear, speed, torque, and efficiency or loss, at the input or the output.
 
     A compressor or turbine goes into the mean_value part of the engine that --like names, as the compact map
     nearest to its points of corrected flow and speed, pressure ratio and efficiency; a turbine may have vane
@@ -118,7 +128,7 @@ def import_map(
         file, kind, like=like, full_load=full_load, motoring=motoring, nox=nox,
         columns=pairs("--column", column, roles_of(kind)), units=pairs("--unit", unit, roles_of(kind)),
         rows=rows, sheet=sheet, values=values, reference=_reference(reference), start_soc=start_soc,
-        temperature_c=temperature,
+        temperature_c=temperature, side=side,
     )  # fmt: skip
     plot, imported = found.write(out), found.imported
     for note in imported.notes:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.engine import Engine
-from hevopt.car.transmission import Gearbox, input_torque_nm
+from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
 from hevopt.driving.demand import Demand
 
@@ -82,10 +82,10 @@ def _engine_speed_and_need(
     demand: Demand, gear: NDArray[np.int64], engine: Engine, gearbox: Gearbox
 ) -> tuple[Array, Array]:
     """(time,) engine speed and the torque it must give alone, in a gear; 0 torque in neutral."""
-    ratio, efficiency = gearbox.ratios[gear], gearbox.efficiency[gear]
+    ratio = gearbox.ratios[gear]
     input_speed = ratio * demand.wheel_speed_radps
     inertia = np.where(
         input_speed >= engine.idle_radps, engine.inertia_kgm2 * ratio * demand.wheel_accel_radps2, 0
     )
-    need = input_torque_nm(demand.wheel_torque_nm, ratio, efficiency) + inertia
+    need = gearbox.needed_nm(gear, input_speed, demand.wheel_torque_nm) + inertia
     return np.maximum(input_speed, engine.idle_radps), np.where(gear > 0, need, 0.0)

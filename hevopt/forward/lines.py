@@ -89,6 +89,8 @@ def _check(car: Architecture) -> None:
         lacking = "it has no engine behind a driver's clutch and gears"
     elif line.free_engine_speed:
         lacking = "its engine's speed is free"
+    elif car.gearbox is not None and car.gearbox.loss is not None:
+        lacking = "its gearbox has a loss_map, and the driven car one efficiency a gear"
     elif odd:
         lacking = f"the strategy moves {', '.join(odd)}"
     elif len(line.machines) != 1:

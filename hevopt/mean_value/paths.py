@@ -73,6 +73,11 @@ def _paths(architecture: Architecture, state: State, phase: Phase, gear: int) ->
     if not found.tied or driveline.engine is None:
         return None
     joints = found.joints(gear)
+    if any(joint.lost is not None for joint in joints):
+        raise DataError(
+            f"{architecture.source}: its gearbox has a loss_map, and a tip-in counts with one efficiency a gear; "
+            "give efficiency in its place for a tip-in"
+        )
     speed = _speeds(found, joints)
     rigid = _rigid(found, joints, driveline.engine)
     machines: list[Path | None] = []

@@ -126,7 +126,9 @@ class PowerFlows(Flows):
         for joint in joints_of(here.way):
             entering_w = joints[joint.name] * here.torques.sense_radps(joint)[:, None]
             name = f"{joint.loss}_loss_w"
-            if not joint.speed:
+            if joint.lost is not None:
+                found[name] = found[name] + here.torques.lost_w(joint, joints[joint.name])
+            elif not joint.speed:
                 found[name] = found[name] + entering_w
             elif not joint.lossless:
                 eta = here.shafts.at(joint.efficiency)

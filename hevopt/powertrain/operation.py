@@ -129,7 +129,7 @@ def _friction_nm(car: Architecture, shafts: Shafts, gap: Array) -> Array:
 
 
 def completed(here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
-    """All torques: of engine, machines, friction brake (negative), and of joints that only push.
+    """All torques: of engine, machines, friction brake (negative), and of joints that only push or lose by a map.
 
     (state, level), or (state, 1) or (1, 1) where all levels, or states, have one.
 
@@ -137,8 +137,8 @@ def completed(here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
     brakes take what the shafts do not.
     """
     way, torques = here.way, here.torques
-    pushing = [joint.name for joint in joints_of(way) if joint.pushes]
-    wanted = [name for name in (*way.active, BRAKE, *pushing) if name not in given]
+    beside = [joint.name for joint in joints_of(way) if joint.pushes or joint.lost is not None]
+    wanted = [name for name in (*way.active, BRAKE, *beside) if name not in given]
     if way.slack is None or way.slack in given:
         found = torques.solve(given, wanted)
     else:

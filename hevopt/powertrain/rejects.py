@@ -9,6 +9,7 @@ from hevopt.car.balance import directions, joints_of
 from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.car.parts import WHEEL
 from hevopt.powertrain.operation import Setting
+from hevopt.powertrain.torques import mapped_of
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.reject import Reject
 
@@ -41,11 +42,14 @@ def limit_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
     for joint in joints_of(here.way):
         if joint.pushes:
             found = found | bits(Reject.NO_PATH, torques[joint.name] < -tolerance)
+        if joint.lost is not None:
+            off = here.torques.off_map(joint, torques[joint.name])
+            found = found | bits(Reject.GEARBOX_MAP, off)
     for clutch in here.way.freed:
         if set(clutch.freed()) <= set(here.way.shafts):
             speeds = [c * here.shafts.speed_radps[s] for s, c in clutch.freed().items()]
             found = found | bits(Reject.NO_PATH, np.sum(speeds, axis=0)[:, None] < -tolerance)
-    for torque in torques.values() if len(directions(here.way)) > 1 else ():
+    for torque in torques.values() if _may_fail(here) else ():
         unsolved = np.isnan(torque)
         if unsolved.any():
             found = found | bits(Reject.NO_PATH, unsolved)
@@ -115,6 +119,11 @@ def function_rejects(
 def bits(reason: Reject, where: Flags) -> Bits:
     """The reason's bit where it holds."""
     return where.astype(np.uint16) * np.uint16(reason)
+
+
+def _may_fail(here: Setting) -> bool:
+    """Whether a balance may have no solution: where directions of power have to agree, or losses to settle."""
+    return len(directions(here.way)) > 1 or bool(mapped_of(here.way))
 
 
 def _standing(here: Setting) -> Flags:

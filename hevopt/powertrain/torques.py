@@ -2,7 +2,8 @@
 
 Every shaft is in balance: reactions of joints and torques of actuators equal what inertia and wheels take. A joint
 with loss passes on less on the side that power leaves by; which side that is depends on the torques themselves, so
-that all combinations are tried and the one taken that agrees with its own result.
+that all combinations are tried and the one taken that agrees with its own result. A gearbox whose losses are a map
+is a lossless joint, and what it loses acts on its output; the torque in it follows in closed form.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,11 +12,12 @@ from functools import lru_cache
 import numpy as np
 
 from hevopt.car.balance import acting_on, directions, joints_of, torques_of
+from hevopt.car.gear_loss import GearLoss, loss_at
 from hevopt.car.linear import Coefficient
 from hevopt.car.parts import Joint
 from hevopt.car.ways import Way
 from hevopt.powertrain.shafts import Shafts
-from hevopt.problem.arrays import Array
+from hevopt.problem.arrays import Array, Flags, Indices
 
 
 class Torques:
@@ -23,10 +25,14 @@ class Torques:
 
     def __init__(self, way: Way, shafts: Shafts) -> None:
         self.way, self.shafts = way, shafts
-        self._on = tuple(shafts.acting_nm)
-        self._acting_nm = np.array([shafts.acting_nm[shaft] for shaft in self._on])
-        lossy = [joint for joint in joints_of(way) if not joint.lossless]
+        self._mapped = mapped_of(way)
         states = len(shafts.step)
+        outputs = (joint.ends[1] for joint in self._mapped)
+        self._on = tuple(dict.fromkeys((*shafts.acting_nm, *outputs)))
+        nothing = np.zeros(states)
+        self._acting_nm = np.array([shafts.acting_nm.get(shaft, nothing) for shaft in self._on])
+        self._losses = [_lost(joint, shafts) for joint in self._mapped]
+        lossy = [joint for joint in joints_of(way) if not joint.lossless]
         sense = [self.sense_radps(joint) for joint in lossy]
         self._sense_radps = np.array(sense) if sense else np.empty((0, states))
 
@@ -36,7 +42,7 @@ class Torques:
         given: (state, level), (state, 1) or (1, 1) each. NaN where no direction of power agrees with its own
         result. What is given as nothing, (1, 1) and 0, costs nothing.
         """
-        from hevopt.powertrain._torque_kernels import resolved
+        from hevopt.powertrain._torque_kernels import resolved, resolved_with_losses
 
         names = tuple(sorted(given))
         acting = tuple(name for name in names if given[name].size > 1 or given[name].item() != 0)
@@ -45,11 +51,41 @@ class Torques:
         values = np.empty((len(acting), *shape))
         for place, name in enumerate(acting):
             values[place] = given[name]
-        terms = _terms(self.way, names, self._on, acting, tuple(wanted))
+        asked = (*(joint.name for joint in self._mapped), *wanted)
+        terms = _terms(self.way, names, self._on, acting, asked)
         signs = np.array(directions(self.way), dtype=float).reshape(len(terms), -1)
         gear = self.shafts.gear if terms.shape[-1] > 1 else np.zeros(states, dtype=np.int64)
-        found = resolved(terms, signs, self._sense_radps, gear, self._acting_nm, values)
-        return dict(zip(wanted, found, strict=True))
+        if not self._mapped:
+            found = resolved(terms, signs, self._sense_radps, gear, self._acting_nm, values)
+            return dict(zip(wanted, found, strict=True))
+        places = np.array([self._on.index(joint.ends[1]) for joint in self._mapped])
+        ratio, knot_nm, lost_nm = (np.array(part) for part in zip(*self._losses, strict=True))
+        found = resolved_with_losses(
+            terms,
+            signs,
+            self._sense_radps,
+            gear,
+            self._acting_nm,
+            values,
+            places,
+            ratio,
+            knot_nm,
+            lost_nm,
+        )
+        return dict(zip(wanted, found[len(self._mapped) :], strict=True))
+
+    def lost_w(self, joint: Joint, torque_nm: Array) -> Array:
+        """(state, level) what a gearbox with a map loses at torques in it."""
+        n = [other.name for other in self._mapped].index(joint.name)
+        _, knot_nm, lost_nm = self._losses[n]
+        torque = np.broadcast_to(torque_nm, (len(knot_nm), torque_nm.shape[1]))
+        speed: Array = self.shafts.speed_radps[joint.ends[0]]
+        return loss_at(knot_nm, lost_nm, torque) * speed[:, None]
+
+    def off_map(self, joint: Joint, torque_nm: Array) -> Flags:
+        """(state, level) where a gearbox with a map has no data for a torque in it."""
+        losses, gear = _data(joint, self.shafts)
+        return losses.unknown(gear, self.shafts.speed_radps[joint.ends[0]], torque_nm)
 
     def sense_radps(self, joint: Joint) -> Array:
         """(state,) speed that times the joint's lambda is the power that enters it."""
@@ -58,6 +94,30 @@ class Torques:
         for shaft, coefficient in joint.sense.items():
             total = total + self.shafts.at(coefficient) * speeds[shaft]
         return total
+
+
+@lru_cache(maxsize=4096)
+def mapped_of(way: Way) -> tuple[Joint, ...]:
+    """The joints of a way whose losses are a map."""
+    return tuple(joint for joint in joints_of(way) if joint.lost is not None)
+
+
+def _data(joint: Joint, shafts: Shafts) -> tuple[GearLoss, Indices]:
+    """A joint's map, and the gear of each state."""
+    assert joint.lost is not None
+    losses, gear = joint.lost
+    of_state = (
+        gear[shafts.gear] if isinstance(gear, np.ndarray) else np.full(len(shafts.gear), gear)
+    )
+    return losses, of_state
+
+
+def _lost(joint: Joint, shafts: Shafts) -> tuple[Array, Array, Array]:
+    """(state,) input over output speed, and (state, knot) torques and losses at the input."""
+    losses, gear = _data(joint, shafts)
+    first, second = joint.ends
+    ratio = np.broadcast_to(-np.asarray(shafts.at(joint.speed[second])), gear.shape)
+    return ratio.astype(float), *losses.knots(gear, shafts.speed_radps[first])
 
 
 @lru_cache(maxsize=16384)

@@ -19,6 +19,7 @@ class Reject(IntFlag):
     MACHINE_MAP = 1024
     BEATEN = 2048
     BRAKING = 4096
+    GEARBOX_MAP = 8192
 
 
 REJECT_WORDS: dict[Reject, str] = {
@@ -35,4 +36,5 @@ REJECT_WORDS: dict[Reject, str] = {
     Reject.MACHINE_MAP: "outside the machine map",
     Reject.BEATEN: "beaten by another control",
     Reject.BRAKING: "more braking than the machine's axle may take",
+    Reject.GEARBOX_MAP: "outside the gearbox map",
 }

@@ -107,7 +107,8 @@ def _base(
         origins["capacity_ah"] = "by current and soc of the test"
     base = with_changes(base, values)
     origins |= dict.fromkeys(values, "given")
-    window = base.get("soc") if isinstance(base.get("soc"), dict) else {}
+    given: Any = base.get("soc")
+    window = given if isinstance(given, dict) else {}
     missing = [key for key in ("cells_in_series", "capacity_ah") if key not in base]
     missing += [f"soc.{key}" for key in _WINDOW if key not in window]
     if missing:

@@ -12,7 +12,7 @@ from hevopt.errors import DataError
 from hevopt.measured.battery.events import BatteryEvents, events_of
 from hevopt.measured.battery.fit import BatteryFit, fit_battery
 from hevopt.measured.battery.samples import BatteryCurves, BatterySamples
-from hevopt.measured.maps.lines import clusters
+from hevopt.measured.clusters import clusters
 
 Array = NDArray[np.float64]
 

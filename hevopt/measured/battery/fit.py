@@ -18,7 +18,7 @@ from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.battery.events import BatteryEvents
 from hevopt.measured.battery.samples import BatterySamples
-from hevopt.measured.maps.lines import clusters
+from hevopt.measured.clusters import clusters
 
 Array = NDArray[np.float64]
 

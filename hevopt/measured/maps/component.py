@@ -13,6 +13,9 @@ from hevopt.files.writing import check_outs, write_whole
 from hevopt.measured.battery.component import ImportedBattery, import_battery
 from hevopt.measured.battery.figure import battery_figure
 from hevopt.measured.battery.samples import ROLES as BATTERY_ROLES
+from hevopt.measured.gearbox.component import ImportedGearbox, import_gearbox
+from hevopt.measured.gearbox.figure import gearbox_figure
+from hevopt.measured.gearbox.points import ROLES as GEARBOX_ROLES
 from hevopt.measured.maps.engine import import_engine
 from hevopt.measured.maps.machine import import_machine
 from hevopt.measured.maps.plot import map_figure
@@ -27,15 +30,21 @@ from hevopt.measured.maps.turbo_points import ROLES as TURBO_ROLES
 from hevopt.measured.sources import digests, own_file
 
 _IMPORTS = {"engine": import_engine, "machine": import_machine}
+Imported = ImportedMap | ImportedTurbo | ImportedBattery | ImportedGearbox
 _CURVES = ("--full-load", "--motoring", "--nox", "--rows")
 # kind -> options that it alone, or with others, has; what its columns may be
 _OPTIONS_OF = {
     "engine": _CURVES,
     "machine": _CURVES,
     "battery": ("--start-soc", "--temperature"),
+    "gearbox": ("--side",),
     **dict.fromkeys(TURBO_KINDS, ("--reference",)),
 }
-_ROLES_OF = {"battery": BATTERY_ROLES, **dict.fromkeys(TURBO_KINDS, TURBO_ROLES)}
+_ROLES_OF = {
+    "battery": BATTERY_ROLES,
+    "gearbox": GEARBOX_ROLES,
+    **dict.fromkeys(TURBO_KINDS, TURBO_ROLES),
+}
 # First line of every component that an import writes, by which the next import knows it.
 _HEAD = "Measured map, written by hevopt maps import."
 
@@ -49,7 +58,7 @@ class MapComponent(Shown):
     sources: the files that were read
     """
 
-    imported: ImportedMap | ImportedTurbo | ImportedBattery
+    imported: Imported
     coverage: tuple[str, ...]
     text: str
     sources: tuple[Path, ...]
@@ -68,11 +77,13 @@ class MapComponent(Shown):
         return plot
 
 
-def _picture(imported: ImportedMap | ImportedTurbo | ImportedBattery) -> bytes:
+def _picture(imported: Imported) -> bytes:
     if isinstance(imported, ImportedTurbo):
         return turbo_figure(imported)
     if isinstance(imported, ImportedBattery):
         return battery_figure(imported.file.name, imported.curves)
+    if isinstance(imported, ImportedGearbox):
+        return gearbox_figure(imported.file.name, imported.points, imported.grids)
     return map_figure(imported)
 
 
@@ -92,27 +103,30 @@ def import_map(
     reference: tuple[float, float] | None = None,
     start_soc: float | None = None,
     temperature_c: float | None = None,
+    side: str | None = None,
 ) -> MapComponent:
     """A component from measured points of an engine, a machine, a battery, or an engine's compressor or turbine.
 
     file: table of the points, of engine and machine also a grid or a .mat file of axes and matrix; of a battery a
     test in time (time, current, voltage, and soc or charge) or curves over charge
-    kind: "engine", "machine", "battery", "compressor" or "turbine"
+    kind: "engine", "machine", "battery", "gearbox", "compressor" or "turbine"
     reference: of a compressor or turbine: temperature in K and pressure in Pa to which flow and speed are corrected
     start_soc: of a battery: its state of charge at the first row, where no column has it
     temperature_c: of a battery: which of the temperatures measured the component is of
+    side: of a gearbox: "input" or "output", of which speed and torque are, where their names do not tell
     like: name or file of a component that gives the remaining keys; values: key of the component -> value
     full_load, motoring, nox: FILE or FILE#SHEET of the full-load curve, the motoring curve, and NOx where `file`
     has none
     columns, units: role (speed, torque, fuel, specific, efficiency, nox, loss, electric, full, motoring;
     of a compressor or turbine speed, flow, ratio, efficiency, vanes; of a battery time, current, voltage, soc,
-    charge, temperature, open_circuit, resistance, discharge, charging) -> name of a column, its unit
+    charge, temperature, open_circuit, resistance, discharge, charging; of a gearbox gear, speed, torque,
+    efficiency, loss) -> name of a column, its unit
     rows: "speed" or "torque", what a grid's first column holds; sheet: of a workbook
     Raises DataError where something is missing or wrong, with its place.
     """
     _refuse_others(
         kind,
-        {"--reference": reference, "--start-soc": start_soc, "--temperature": temperature_c,
+        {"--reference": reference, "--start-soc": start_soc, "--temperature": temperature_c, "--side": side,
          "--full-load": full_load, "--motoring": motoring, "--nox": nox, "--rows": rows},
     )  # fmt: skip
     if rows not in (None, "speed", "torque"):
@@ -129,6 +143,14 @@ def import_map(
             start_soc=start_soc, temperature_c=temperature_c,
         )  # fmt: skip
         return _whole(battery, Path(file), like)
+    if kind == "gearbox":
+        if side not in (None, "input", "output"):
+            raise DataError(f"side = {shown(side)}; allowed: input, output")
+        gearbox = import_gearbox(
+            Path(file), like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
+            side=side,
+        )  # fmt: skip
+        return _whole(gearbox, Path(file), like)
     path, extra = Path(file), {"full": full_load, "motoring": motoring, "nox": nox}
     source = Source(path, sheet, columns or {}, units or {}, rows)
     others = {
@@ -169,7 +191,9 @@ def _turbo(
     return _whole(found, path, like)
 
 
-def _whole(found: ImportedTurbo | ImportedBattery, path: Path, like: str | None) -> MapComponent:
+def _whole(
+    found: ImportedTurbo | ImportedBattery | ImportedGearbox, path: Path, like: str | None
+) -> MapComponent:
     others = [f"Other keys from {like}."] if like is not None else []
     head = [_HEAD, *digests([path]), *others, *found.notes, *found.said]
     text = component_text(head, found.contents, found.origins)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
+from hevopt.measured.clusters import clusters
 from hevopt.measured.maps.points import Points
 from hevopt.measured.tables.rows import runs
 from hevopt.units import RPM_PER_RADPS
@@ -154,19 +155,6 @@ def _said_of_repeats(points: Points, value: Array, which: Array, average: Array,
             "remove the wrong one"
         )
     return said
-
-
-def clusters(values: Array, apart: float, share: float) -> tuple[NDArray[np.int64], Array]:
-    """Number of each value's cluster, and the clusters' means, rising.
-
-    Neighbours are of one cluster up to a distance `apart`, or a share of the value; rounding is none.
-    """
-    order = np.argsort(values, kind="stable")
-    ordered, rounding = values[order], _SAME * np.abs(values).max()
-    reach = np.maximum(np.maximum(apart, share * np.abs(ordered)), rounding)
-    cluster = np.empty(len(values), dtype=np.int64)
-    cluster[order] = np.cumsum(np.concatenate([[False], np.diff(ordered) > reach[1:]]))
-    return cluster, np.bincount(cluster, values) / np.bincount(cluster)
 
 
 def _tidy(values: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.measured.maps.lines import clusters
+from hevopt.measured.clusters import clusters
 from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import (
     Measured,
