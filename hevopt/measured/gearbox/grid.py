@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 # Speeds and torques closer than these shares are one.
 _SPEED_SHARE, _TORQUE_SHARE = 0.01, 0.02
 _TORQUES_MAX = 60
-_ROUNDING = 1e-9
+_ROUNDING, _SAME = 1e-9, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -69,7 +69,12 @@ def _torques(torque: Array, line: NDArray[np.int64], lines: int) -> Array:
     inner = found[(found > low) & (found < high)]
     if len(inner) > _TORQUES_MAX:
         inner = np.quantile(inner, np.linspace(0, 1, _TORQUES_MAX))
-    return _tidy(np.unique(np.concatenate([[low], inner, [high], [0.0] if low < 0 < high else []])))
+    every = _tidy(np.concatenate([[low], inner, [high], [0.0] if low < 0 < high else []]))
+    every = np.unique(every)
+    # The ends stay; what lies next to another by rounding only goes.
+    apart = np.diff(every, prepend=-np.inf) > _SAME * scale
+    apart[-1] = True
+    return every[apart]
 
 
 def _row(torque: Array, loss: Array, axis: Array) -> Array:
