@@ -39,7 +39,7 @@ class GearLossFile(FileModel):
 
     speed_rpm: Speeds
     torque_nm: Curve
-    loss_nm: list[list[float]]
+    loss_nm: list[list[Annotated[float, Field(allow_inf_nan=True)]]]
 
     @model_validator(mode="after")
     def _grid(self) -> Self:

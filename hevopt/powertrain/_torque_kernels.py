@@ -69,9 +69,9 @@ def _balanced(base: float, per_nm: float, ratio: float, knot: Array, lost: Array
     """
     last, share = len(knot) - 1, per_nm * ratio
     if knot[0] - share * lost[0] >= base:
-        return base + share * lost[0]
+        return float(base + share * lost[0])
     if knot[last] - share * lost[last] <= base:
-        return base + share * lost[last]
+        return float(base + share * lost[last])
     low, high = 0, last
     while high - low > 1:
         middle = (low + high) // 2
@@ -80,18 +80,18 @@ def _balanced(base: float, per_nm: float, ratio: float, knot: Array, lost: Array
         else:
             high = middle
     slope = (lost[high] - lost[low]) / (knot[high] - knot[low])
-    return (base + share * (lost[low] - slope * knot[low])) / (1.0 - share * slope)
+    return float((base + share * (lost[low] - slope * knot[low])) / (1.0 - share * slope))
 
 
 @compiled()
 def _loss(torque: float, knot: Array, lost: Array) -> float:
     last = len(knot) - 1
     if torque <= knot[0]:
-        return lost[0]
+        return float(lost[0])
     if torque >= knot[last]:
-        return lost[last]
+        return float(lost[last])
     k = np.searchsorted(knot, torque) - 1
-    return lost[k] + (lost[k + 1] - lost[k]) * (torque - knot[k]) / (knot[k + 1] - knot[k])
+    return float(lost[k] + (lost[k + 1] - lost[k]) * (torque - knot[k]) / (knot[k + 1] - knot[k]))
 
 
 @compiled()
