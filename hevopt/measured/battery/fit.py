@@ -83,20 +83,19 @@ def fit_battery(test: BatterySamples, found: BatteryEvents) -> BatteryFit:
         )
     curves = (turn @ solved.x).reshape(3, count)
     loaded = np.concatenate([found.steady, pulses[:, 1]])
-    told = [_told(nodes, test.soc[loaded[sign * current[loaded] > 0]]) for sign in (1, -1)]
+    drawn, taken = (_told(nodes, test.soc[loaded[s * current[loaded] > 0]]) for s in (1, -1))
     voltage, discharge, charge = curves
-    both = told[0].any() and told[1].any()
+    # A direction without any load has the other's resistance.
     discharge, charge = (
-        _nearest(nodes, r, t) if t.any() else None for r, t in zip((discharge, charge), told, strict=True)
-    )  # fmt: skip
-    if not both:
-        discharge = charge = discharge if discharge is not None else charge
-    ohmic = [_ohmic(test, found, nodes, sign) for sign in (1, -1)]
+        _nearest(nodes, discharge, drawn) if drawn.any() else _nearest(nodes, charge, taken),
+        _nearest(nodes, charge, taken) if taken.any() else _nearest(nodes, discharge, drawn),
+    )
     every = _levels(test, nodes, np.arange(len(current)))
     off = test.voltage_v - every @ np.concatenate([voltage, discharge, charge])
     return BatteryFit(
-        nodes, voltage, discharge, charge, *ohmic, *told, len(still) + len(pulses), off
-    )
+        nodes, voltage, discharge, charge, _ohmic(test, found, nodes, 1), _ohmic(test, found, nodes, -1),
+        drawn, taken, len(still) + len(pulses), off,
+    )  # fmt: skip
 
 
 def _nodes(soc: Array) -> Array:
@@ -136,7 +135,8 @@ def _differences(count: int, order: int) -> Array:
 
 
 def _told(nodes: Array, soc: Array) -> NDArray[np.bool_]:
-    return (_weights(nodes, soc) > 0).any(axis=0)
+    told: NDArray[np.bool_] = np.any(_weights(nodes, soc) > 0, axis=0)
+    return told
 
 
 def _nearest(nodes: Array, values: Array, told: NDArray[np.bool_]) -> Array:

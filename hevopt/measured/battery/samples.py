@@ -137,7 +137,7 @@ def _values(
                     f"{role}=NAME; {columns_found(measured)}"
                 )
             continue
-        column = as_clock(column) if role == "time" else column
+        column = (as_clock(column) or column) if role == "time" else column
         found = in_si(measured, column, _QUANTITIES[role], f"--unit {role}=UNIT", units.get(role))
         cold = _ZERO_CELSIUS_K if found.quantity == "kelvin" else 0.0
         values[role] = found.values - cold
