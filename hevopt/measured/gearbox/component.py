@@ -100,7 +100,7 @@ def _said(points: GearPoints, grids: tuple[GearGrid, ...]) -> list[str]:
         data = grid.data
         torque, loss = np.broadcast_to(data.torque_nm, data.loss_nm.shape), data.loss_nm
         with np.errstate(invalid="ignore", divide="ignore"):
-            eta = np.where(torque > 0, 1 - loss / torque, np.nan)
+            eta = np.where((torque > 0) & (loss > 0), 1 - loss / torque, np.nan)
         rpm = data.speed_radps * RPM_PER_RADPS
         best = np.unravel_index(np.nanargmax(eta), eta.shape)
         said.append(

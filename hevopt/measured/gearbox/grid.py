@@ -14,9 +14,10 @@ from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
 
-# Speeds and torques closer than these shares are one.
-_SPEED_SHARE, _TORQUE_SHARE = 0.01, 0.02
-_TORQUES_MAX = 60
+# Speeds closer than this share are one.
+_SPEED_SHARE = 0.01
+# Share of the largest torque by which a speed's last point may fall short of it and still be the map's end.
+_SHORT = 0.15
 _ROUNDING, _SAME = 1e-9, 1e-6
 
 
@@ -58,23 +59,27 @@ def _grid(points: GearPoints, number: int, place: str) -> GearGrid:
 
 
 def _torques(torque: Array, line: NDArray[np.int64], lines: int) -> Array:
-    """(torque,) rising: torques of the points, close ones joined, with the ends that most speeds reach."""
-    scale = float(np.abs(torque).max())
-    _, found = clusters(torque, 1e-3 * scale, _TORQUE_SHARE)
-    ends = (
-        [torque[line == k].min() for k in range(lines)],
-        [torque[line == k].max() for k in range(lines)],
+    """(torque,) rising: those of the speed with most points, 0, and ends that all speeds reach but shorter ones."""
+    counts = np.bincount(line, minlength=lines)
+    fullest = np.flatnonzero(counts == counts.max())
+    own = np.unique(torque[line == fullest[len(fullest) // 2]])
+    low, high = (
+        -_reached([-torque[line == k].min() for k in range(lines)]),
+        _reached([torque[line == k].max() for k in range(lines)]),
     )
-    low, high = float(np.median(ends[0])), float(np.median(ends[1]))
-    inner = found[(found > low) & (found < high)]
-    if len(inner) > _TORQUES_MAX:
-        inner = np.quantile(inner, np.linspace(0, 1, _TORQUES_MAX))
-    every = _tidy(np.concatenate([[low], inner, [high], [0.0] if low < 0 < high else []]))
-    every = np.unique(every)
-    # The ends stay; what lies next to another by rounding only goes.
-    apart = np.diff(every, prepend=-np.inf) > _SAME * scale
+    inner = own[(own > low) & (own < high)]
+    ends = [low, high, *([0.0] if low < 0 < high else [])]
+    every = np.unique(_tidy(np.concatenate([inner, ends])))
+    # What lies next to another by rounding only goes; the ends stay.
+    apart = np.diff(every, prepend=-np.inf) > _SAME * np.abs(every).max()
     apart[-1] = True
     return every[apart]
+
+
+def _reached(ends: list[float]) -> float:
+    """The least of those ends that come near the largest: a speed measured less far does not cut the others."""
+    far = max(ends)
+    return min(end for end in ends if end >= far - _SHORT * abs(far))
 
 
 def _row(torque: Array, loss: Array, axis: Array) -> Array:

@@ -100,16 +100,7 @@ def read_gear_points(
     _check_values(measured, values, len(ratios))
     at_output = _side(measured, names, side) == "output"
     gear = values["gear"].astype(np.int64)
-    ratio = np.asarray(ratios)[gear - 1]
-    speed = values["speed"] * ratio if at_output else values["speed"]
-    torque = values["torque"] / ratio if at_output else values["torque"]
-    given = values.get("loss", values.get("efficiency"))
-    assert given is not None
-    if "loss" in values:
-        lost = given if kinds["loss"] == "torque" else given / speed
-        torque = torque + lost if at_output else torque
-    else:
-        torque, lost = _by_efficiency(torque, given, at_output)
+    speed, torque, lost = _at_input(values, kinds, np.asarray(ratios)[gear - 1], at_output)
     known = np.isfinite(lost)
     notes += _left_out(values, known)
     notes.append(
@@ -196,9 +187,21 @@ def _side_of(name: str) -> str | None:
     return None
 
 
+def _at_input(
+    values: Mapping[str, Array], kinds: Mapping[str, str], ratio: Array, at_output: bool
+) -> tuple[Array, Array, Array]:
+    """(point,) speed, torque and torque lost at the input."""
+    speed = values["speed"] * ratio if at_output else values["speed"]
+    torque = values["torque"] / ratio if at_output else values["torque"]
+    if "loss" in values:
+        lost = values["loss"] if kinds["loss"] == "torque" else values["loss"] / speed
+        return speed, torque + lost if at_output else torque, lost
+    return speed, *_by_efficiency(torque, values["efficiency"], at_output)
+
+
 def _by_efficiency(torque: Array, eta: Array, at_output: bool) -> tuple[Array, Array]:
-    """Torque and torque lost at the input; NaN where efficiency says neither: without torque, or where it is 0."""
-    told = np.where((eta > 0) & (torque != 0), eta, np.nan)
+    """Torque and torque lost at the input; NaN where efficiency tells neither: no torque, or 0 or 1."""
+    told = np.where((eta > 0) & (eta < 1) & (torque != 0), eta, np.nan)
     if at_output:
         at_input = np.where(torque > 0, torque / told, torque * told)
         return at_input, at_input - torque
@@ -206,17 +209,27 @@ def _by_efficiency(torque: Array, eta: Array, at_output: bool) -> tuple[Array, A
 
 
 def _left_out(values: Mapping[str, Array], known: NDArray[np.bool_]) -> list[str]:
-    """What was left out, and efficiencies of 1, which no gearbox has."""
-    notes = []
-    if (~known).any():
-        notes.append(
-            f"left out: {np.sum(~known)} of {len(known)} points without a loss, such as an efficiency of 0 (all "
-            "power is lost, and nothing says how much it would take) or one without torque"
+    """What was left out, and why."""
+    if known.all():
+        return []
+    eta = values.get("efficiency", np.full(len(known), np.nan))
+    why = [
+        f"{count} {words}"
+        for count, words in (
+            (
+                int(np.sum(eta == 0)),
+                "of efficiency 0: all power is lost, and nothing says how much more would be",
+            ),
+            (
+                int(np.sum(eta == 1)),
+                "of efficiency 1: no gearbox loses nothing, as where a formula was clipped",
+            ),
         )
-    whole = int(np.sum(values.get("efficiency", np.zeros(1)) == 1))
-    if whole:
-        notes.append(
-            f"WARNING: efficiency 1 at {whole} points: no gearbox loses nothing, as where a formula was clipped; "
-            "the map has no loss there, delete the rows if they are not to be believed"
-        )
-    return notes
+        if count
+    ]
+    others = int(np.sum(~known)) - int(np.sum((eta == 0) | (eta == 1)))
+    why += [f"{others} without a loss or a torque"] if others else []
+    return [
+        f"left out: {np.sum(~known)} of {len(known)} points, {'; '.join(why)}; the map is straight between those "
+        "that stay"
+    ]
