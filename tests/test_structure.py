@@ -57,6 +57,7 @@ LONG = {
     "commands.turbo.tipin": "a list of options",
     "bounds._lower_dp_kernels.lower_backward": "one recursion, compiled as a whole",
     "bounds.step_prices._lp_part": "one linear program, set up as its docstring says",
+    "measured.maps.component.import_map": "a list of options, and what each is",
     "measured.maps.machine.import_machine": "one import from file to map, in its steps",
 }
 # Names that classes of two rooms still share; a name that is gone from here does not come back.

@@ -45,6 +45,8 @@ def import_gearbox(
     sheet: str | None, values: Mapping[str, Any], side: str | None,
 ) -> ImportedGearbox:  # fmt: skip
     """A gearbox's file; DataError where something is missing or wrong. values: key of the component -> value"""
+    if side not in (None, "input", "output"):
+        raise DataError(f"side = {shown(side)}; allowed: input, output")
     base, origins = _base(path, like, values)
     ratios = [ratio * base["final_drive_ratio"] for ratio in base["ratios"]]
     points = read_gear_points(path, sheet, columns, units, side, ratios)

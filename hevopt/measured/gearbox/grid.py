@@ -73,7 +73,8 @@ def _torques(torque: Array, line: NDArray[np.int64], lines: int) -> Array:
     # What lies next to another by rounding only goes; the ends stay.
     apart = np.diff(every, prepend=-np.inf) > _SAME * np.abs(every).max()
     apart[-1] = True
-    return every[apart]
+    kept: Array = every[apart]
+    return kept
 
 
 def _reached(ends: list[float]) -> float:

@@ -129,39 +129,46 @@ def import_map(
         {"--reference": reference, "--start-soc": start_soc, "--temperature": temperature_c, "--side": side,
          "--full-load": full_load, "--motoring": motoring, "--nox": nox, "--rows": rows},
     )  # fmt: skip
-    if rows not in (None, "speed", "torque"):
-        raise DataError(f"rows = {shown(rows)}; allowed: speed, torque")
-    for what, given in (("columns", columns), ("units", units)):
-        for role in given or {}:
-            if role not in roles_of(kind):
-                raise DataError(f"{what}: {unknown_name('role', role, list(roles_of(kind)))}")
+    _check_words(kind, rows, {"columns": columns or {}, "units": units or {}})
+    path = Path(file)
+    common: dict[str, Any] = {
+        "like": like, "columns": columns or {}, "units": units or {}, "sheet": sheet, "values": values or {},
+    }  # fmt: skip
     if kind in TURBO_KINDS:
-        return _turbo(Path(file), kind, like, columns, units, sheet, values, reference)
+        return _whole(import_turbo(path, kind, reference=reference, **common), path, like)
     if kind == "battery":
-        battery = import_battery(
-            Path(file), like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
-            start_soc=start_soc, temperature_c=temperature_c,
-        )  # fmt: skip
-        return _whole(battery, Path(file), like)
+        tested = import_battery(path, start_soc=start_soc, temperature_c=temperature_c, **common)
+        return _whole(tested, path, like)
     if kind == "gearbox":
-        if side not in (None, "input", "output"):
-            raise DataError(f"side = {shown(side)}; allowed: input, output")
-        gearbox = import_gearbox(
-            Path(file), like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
-            side=side,
-        )  # fmt: skip
-        return _whole(gearbox, Path(file), like)
-    path, extra = Path(file), {"full": full_load, "motoring": motoring, "nox": nox}
-    source = Source(path, sheet, columns or {}, units or {}, rows)
+        return _whole(import_gearbox(path, side=side, **common), path, like)
+    extra = {"full": full_load, "motoring": motoring, "nox": nox}
+    return _mapped(Source(path, sheet, columns or {}, units or {}, rows), kind, extra, like, values)
+
+
+def _mapped(
+    source: Source, kind: str, extra: Mapping[str, str | Path | None], like: str | None,
+    values: Mapping[str, Any] | None,
+) -> MapComponent:  # fmt: skip
+    """An engine or a machine, whose curves and NOx may have tables of their own."""
     others = {
         role: _beside(str(own), role, source) for role, own in extra.items() if own is not None
     }
     imported = _IMPORTS[kind](Request(source, others, like, values or {}))
     said = tuple(coverage(imported))
-    sources = (path, *(other.path for other in others.values()))
+    sources = (source.path, *(other.path for other in others.values()))
     head = [_HEAD, *digests(sources), *imported.notes, *said]
     text = component_text(head, imported.contents, imported.origins)
     return MapComponent(imported, said, text, (*sources, *map(Path, own_file(like))))
+
+
+def _check_words(kind: str, rows: str | None, roles: Mapping[str, Mapping[str, str]]) -> None:
+    """DataError for an axis or a role that there is not."""
+    if rows not in (None, "speed", "torque"):
+        raise DataError(f"rows = {shown(rows)}; allowed: speed, torque")
+    for what, given in roles.items():
+        for role in given:
+            if role not in roles_of(kind):
+                raise DataError(f"{what}: {unknown_name('role', role, list(roles_of(kind)))}")
 
 
 def roles_of(kind: str) -> tuple[str, ...]:
@@ -177,18 +184,6 @@ def _refuse_others(kind: str, given: Mapping[str, Any]) -> None:
         if value is not None and option not in _OPTIONS_OF[kind]:
             own = [other for other, options in _OPTIONS_OF.items() if option in options]
             raise DataError(f"{option} is for {' and '.join(own)}, not for a {kind}; leave it out")
-
-
-def _turbo(
-    path: Path, kind: str, like: str | None, columns: Mapping[str, str] | None,
-    units: Mapping[str, str] | None, sheet: str | None, values: Mapping[str, Any] | None,
-    reference: tuple[float, float] | None,
-) -> MapComponent:  # fmt: skip
-    found = import_turbo(
-        path, kind, like=like, columns=columns or {}, units=units or {}, sheet=sheet, values=values or {},
-        reference=reference,
-    )  # fmt: skip
-    return _whole(found, path, like)
 
 
 def _whole(
