@@ -14,7 +14,7 @@ from hevopt.files.keypaths import with_changes
 from hevopt.files.lookup import find
 from hevopt.files.shown import shown
 from hevopt.files.toml import checked, read_toml
-from hevopt.measured.gearbox.grid import GearGrid, gear_grids
+from hevopt.measured.gearbox.grid import MeasuredGear, gear_grids
 from hevopt.measured.gearbox.points import GearPoints, read_gear_points
 from hevopt.units import RPM_PER_RADPS
 
@@ -36,7 +36,7 @@ class ImportedGearbox(Shown):
     origins: Mapping[str, str]
     notes: tuple[str, ...]
     points: GearPoints
-    grids: tuple[GearGrid, ...]
+    grids: tuple[MeasuredGear, ...]
     said: tuple[str, ...]
 
 
@@ -96,7 +96,7 @@ def _base(
     return base, origins
 
 
-def _said(points: GearPoints, grids: tuple[GearGrid, ...]) -> list[str]:
+def _said(points: GearPoints, grids: tuple[MeasuredGear, ...]) -> list[str]:
     said = []
     for grid in grids:
         data = grid.data

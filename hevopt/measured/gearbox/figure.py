@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from hevopt.car.grid import interpolated
 from hevopt.display.axes import BLUE, GREEN, GREY, RED, plain
-from hevopt.measured.gearbox.grid import GearGrid
+from hevopt.measured.gearbox.grid import MeasuredGear
 from hevopt.measured.gearbox.points import GearPoints
 from hevopt.measured.plot import png
 from hevopt.units import RPM_PER_RADPS
@@ -19,7 +19,7 @@ _COLUMNS = 3
 _PLACES = ((0.15, BLUE), (0.5, GREEN), (0.9, RED))
 
 
-def gearbox_figure(name: str, points: GearPoints, grids: tuple[GearGrid, ...]) -> bytes:
+def gearbox_figure(name: str, points: GearPoints, grids: tuple[MeasuredGear, ...]) -> bytes:
     """A PNG with a panel a gear: efficiency by direction of power at three speeds."""
     rows = -(-len(grids) // _COLUMNS)
     figure = Figure(figsize=(11, 3.2 * rows + 0.6), layout="constrained")
@@ -34,7 +34,7 @@ def gearbox_figure(name: str, points: GearPoints, grids: tuple[GearGrid, ...]) -
     return png(figure)
 
 
-def _gear(panel: "Axes", points: GearPoints, grid: GearGrid) -> None:
+def _gear(panel: "Axes", points: GearPoints, grid: MeasuredGear) -> None:
     data = grid.data
     torque = np.linspace(data.torque_nm[0], data.torque_nm[-1], 400)
     for share, colour in _PLACES:

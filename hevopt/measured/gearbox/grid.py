@@ -22,7 +22,7 @@ _ROUNDING, _SAME = 1e-9, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class GearGrid(Shown):
+class MeasuredGear(Shown):
     """One gear: its grid, and by how much measured points lie from it, (point,) Nm at the input."""
 
     number: int
@@ -31,12 +31,12 @@ class GearGrid(Shown):
     off_nm: Array
 
 
-def gear_grids(points: GearPoints, gears: int, place: str) -> tuple[GearGrid, ...]:
+def gear_grids(points: GearPoints, gears: int, place: str) -> tuple[MeasuredGear, ...]:
     """The grid of every gear; DataError where a gear has too few points."""
     return tuple(_grid(points, number, place) for number in range(1, gears + 1))
 
 
-def _grid(points: GearPoints, number: int, place: str) -> GearGrid:
+def _grid(points: GearPoints, number: int, place: str) -> MeasuredGear:
     own = np.flatnonzero(points.gear == number)
     if not len(own):
         raise DataError(f"{place}: no point with a loss in gear {number}; add some")
@@ -55,7 +55,7 @@ def _grid(points: GearPoints, number: int, place: str) -> GearGrid:
     inside = ~np.isnan(values).all(axis=0)
     data = LossInGear(_tidy(speed[kept]), axis[inside], values[:, inside])
     _check_slope(data, number, place)
-    return GearGrid(number, data, own, _off(data, points, own))
+    return MeasuredGear(number, data, own, _off(data, points, own))
 
 
 def _torques(torque: Array, line: NDArray[np.int64], lines: int) -> Array:
