@@ -97,7 +97,7 @@ def test_a_map_is_the_command_s_component_and_can_be_put_into_a_car(hevopt):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"kind": "motor"}, "available: engine, machine, compressor, turbine"),
+        ({"kind": "motor"}, "available: engine, machine, battery, gearbox, compressor, turbine"),
         ({"rows": "fuel"}, "rows = 'fuel'; allowed: speed, torque"),
         ({"columns": {"sped": "n"}}, "columns: role 'sped' not found; close matches: speed"),
         ({"like": None}, "the component needs displacement_cm3"),

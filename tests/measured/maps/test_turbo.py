@@ -171,7 +171,7 @@ def test_a_map_that_is_none_is_one_message(folder, what):
         ([], "speed and flow: corrected to which temperature and pressure? Give them with --reference"),
         (["--reference", "25,1"], "--reference: 25 K; allowed: 200 to 1500 K"),
         (["--reference", "298"], "--reference '298'; needed: temperature in K and pressure in bar"),
-        (["--reference", "298,1", "--rows", "speed"], "are for engines and machines, not for a compressor"),
+        (["--reference", "298,1", "--rows", "speed"], "--rows is for engine and machine, not for a compressor"),
         (["--reference", "298,1", "--unit", "torque=Nm"], "torque"),
         (["--reference", "298,1", "--column", "vanes=speed"], "vanes: named with --column or --unit, and a"),
         (["--reference", "298,1", "--set", "mean_value.compressor.work=0.7"], "leave it out"),
@@ -193,7 +193,7 @@ def test_a_part_without_an_engine_and_a_reference_without_a_turbocharger(hevopt,
     seen = hevopt("maps", "import", "map.csv", "--kind", "turbine")
     assert seen.status == 2 and "a turbine is a part of an engine; give --like ENGINE" in seen.err
     seen = hevopt("maps", "import", "map.csv", "--kind", "engine", "--reference", "298,1")
-    assert seen.status == 2 and "--reference is for a compressor or turbine" in seen.err
+    assert seen.status == 2 and "--reference is for compressor and turbine" in seen.err
 
 
 def test_a_turbine_whose_efficiency_has_no_best_is_one_message(folder):
