@@ -21,6 +21,7 @@ from hevopt.commands import (
     studies,
     sweep,
     turbo,
+    validation,
 )
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
@@ -63,6 +64,7 @@ for command in (
     studies.sensitivity,
     studies.reproduction,
     studies.turbo_lag,
+    validation.validation,
     turbo.tipin,
 ):
     app.command()(command)

@@ -18,7 +18,7 @@ cycles_app = typer.Typer(
 _GROUPS = {
     "study": "study: the six of the published study, taken where none is named",
     "hybrids": "templates: a topology each, to start from",
-    "real": "real: cars that were built, laboratory figures beside them in measured.csv",
+    "real": "real: cars that were built, held against the laboratory by hevopt validation",
     "tipin": "tip-in: the car of the study's tip-in",
 }
 
