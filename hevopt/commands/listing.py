@@ -1,5 +1,6 @@
 """`hevopt architectures`, `cycles` and `strategies`: what there is to choose from."""
 
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -72,13 +73,21 @@ def strategies(
     from hevopt.files.lookup import shipped_names
     from hevopt.files.writing import check_writable, write_whole
     from hevopt.output.strategies_page import strategies_page
-    from hevopt.strategies import STRATEGIES
+    from hevopt.strategies import STRATEGIES, every_strategy, left_out
     from hevopt.studies import comparison as study
 
     if out is None:
-        for name, strategy in STRATEGIES.items():
+        for name, strategy in every_strategy().items():
             kind = "causal" if strategy.causal else "offline"
-            write(f"{name:13} {kind:8} knows: {strategy.knows}")
+            knows = f"knows: {strategy.knows}"
+            if name not in STRATEGIES:
+                kind, knows = (
+                    "brought",
+                    f"from {strategy.place.reference}" if strategy.place else "",
+                )
+            write(f"{name:13} {kind:8} {knows}")
+        for fault in left_out():
+            print(f"hevopt: left out: {fault}", file=sys.stderr)
         return
     check_writable(out)
     with Progress() as progress:

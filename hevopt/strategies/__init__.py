@@ -137,6 +137,11 @@ def every_strategy() -> dict[str, Strategy]:
     return STRATEGIES | {name: brought(name, place) for name, place in places.items()} | _registered
 
 
+def left_out() -> tuple[str, ...]:
+    """Strategies that installed packages name and that have no place here, each with why."""
+    return installed(tuple(STRATEGIES))[1]
+
+
 def strategy_named(name: str, others: Mapping[str, Strategy] = _NO_OTHERS) -> Strategy:
     """The strategy of a name, shipped, installed, registered or of some others; DataError with close matches."""
     known = {**every_strategy(), **others}

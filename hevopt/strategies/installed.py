@@ -1,6 +1,6 @@
 """Strategies of installed packages: those that name a function in the entry-point group hevopt.strategies."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -12,7 +12,7 @@ GROUP = "hevopt.strategies"
 
 
 @lru_cache
-def installed(shipped: tuple[str, ...]) -> tuple[Mapping[str, Located], Iterable[str]]:
+def installed(shipped: tuple[str, ...]) -> tuple[Mapping[str, Located], tuple[str, ...]]:
     """Name -> where the function stands, and why others are left out: a name that is taken, or no name.
 
     None of the packages is imported here, but for what lies above a module; what cannot be is told when it is used.

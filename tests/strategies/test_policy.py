@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import call
 from problems import random_problem
 
 from hevopt import (
@@ -279,7 +280,7 @@ def test_a_policy_takes_no_settings_and_can_be_asked_by_another_simulation():
     assert brought("whole", lambda problem: []).start is None
 
 
-def test_strategies_of_installed_packages_are_known(tmp_path, monkeypatch, short):
+def test_strategies_of_installed_packages_are_known(tmp_path, monkeypatch, capsys, short):
     """Three entry points: one that works, one whose module is not there, one with the name of a shipped one."""
     (tmp_path / "brings.py").write_text(
         "import hevopt, numpy\n@hevopt.policy\ndef mine(now):\n    return numpy.argmax(now.usable)\n"
@@ -300,6 +301,9 @@ def test_strategies_of_installed_packages_are_known(tmp_path, monkeypatch, short
         assert known.strategy_named("dp") is known.STRATEGIES["dp"]
         (fault,) = installed(tuple(known.STRATEGIES))[1]
         assert "brings:mine" in fault and "'dp'" in fault
+        listed = call(monkeypatch, capsys, "strategies")
+        assert "first         brought  from brings:mine" in listed.out
+        assert "hevopt: left out: brings:mine: strategy name 'dp': it is taken" in listed.err
     finally:
         sys.modules.pop("brings", None)
 
