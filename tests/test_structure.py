@@ -29,6 +29,7 @@ FLOORS = [
     ["forward"],
     ["studies", "tipin"],
     ["reproduction", "sweeps"],
+    ["sizing"],
     ["output", "checks"],
     ["pages"],
     ["commands"],
