@@ -158,7 +158,7 @@ def _check_driver(
         if changed.any():
             k = int(np.argmax(changed))
             raise NotProvable(
-                f"no proof over ranges: at {first.demand.time_s[k]:g} s the driver's clutch or launch is another with "
+                f"no proof over ranges: at {first.demand.time_s[k]:g} s the driver's clutch is another with "
                 "other sizes of this box; narrow the ranges"
             )
 
