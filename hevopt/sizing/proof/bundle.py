@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.sizing.proof.entries import BATTERY, ENGINE, MACHINE, Box, Cell, Prices
+from hevopt.sizing.proof.entries import BATTERY, ENGINE, MACHINE, Box, OneBattery, Prices
 from hevopt.sizing.proof.laws import Laws
 
 _ROUNDS = 40
@@ -30,7 +30,7 @@ class Planes:
     scale: float
 
 
-def planes_of(laws: Laws, cell: Cell, entries: Array, prices: Prices, scale: float) -> Planes:
+def planes_of(laws: Laws, cell: OneBattery, entries: Array, prices: Prices, scale: float) -> Planes:
     """Planes with what switching costs and the ends of the stored energy under the same prices."""
     kg, joule = laws.switch_kg, laws.switch_j
     by = kg + prices.before[None, :, None, None] * joule

@@ -34,7 +34,7 @@ _PA_PER_BAR = 1e5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cell:
+class OneBattery:
     """One battery: window of stored energy, U² = low_v2 + slope (x - low), resistances, highest power."""
 
     low: float
@@ -64,7 +64,7 @@ def prices_of(after: Array) -> Prices:
     return Prices(after, before - after, before)
 
 
-def cell_of(laws: Laws, start_j: float, end_j: float) -> Cell:
+def cell_of(laws: Laws, start_j: float, end_j: float) -> OneBattery:
     """The battery of a car; NotProvable where U² is not linear in what it stores."""
     battery = laws.car.battery
     line = line_above(battery.within_window())
@@ -80,13 +80,13 @@ def cell_of(laws: Laws, start_j: float, end_j: float) -> Cell:
             f"{laws.car.name}: no proof over ranges, its battery's voltage or loss is constant"
         )
     peak = (1 - _ROOT_MIN**2) * float(squared[0]) / (4 * float(line.discharge_ohm[0]))
-    return Cell(
+    return OneBattery(
         low, high, float(squared[0]), slope, float(line.discharge_ohm[0]), float(line.charge_ohm[0]),
         line.coulombic_efficiency, min(peak, battery.power_max_discharge_w), start_j, end_j,
     )  # fmt: skip
 
 
-def stored(cell: Cell, power: Array, price: Array, tilt: Array) -> tuple[Array, Array, Array]:
+def stored(cell: OneBattery, power: Array, price: Array, tilt: Array) -> tuple[Array, Array, Array]:
     """Power at which W is touched, W there from below and its slope; price: p_t+1 dt.
 
     At a given power the best x is where p dt dr/dx + tilt = 0: with a = U² and B = 2 R b,
@@ -164,7 +164,7 @@ class Box:
 class Touch:
     """Planes of every mode at one theta under some prices. on, braked, off: (time, 4) each, see `entries`."""
 
-    def __init__(self, laws: Laws, cell: Cell, theta: Array, prices: Prices) -> None:
+    def __init__(self, laws: Laws, cell: OneBattery, theta: Array, prices: Prices) -> None:
         self.laws, self.cell, self.prices = laws, cell, prices
         self.at = np.concatenate([[1.0], theta])
         self.weight = laws.step_s * prices.after

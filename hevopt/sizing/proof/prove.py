@@ -23,7 +23,7 @@ from hevopt.errors import DataError, HevoptError
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.arrays import Array
 from hevopt.sizing.proof.bundle import Planes, best_bound, planes_of
-from hevopt.sizing.proof.entries import Box, Cell, Touch, cell_of, impossible, prices_of
+from hevopt.sizing.proof.entries import Box, OneBattery, Touch, cell_of, impossible, prices_of
 from hevopt.sizing.proof.laws import Laws, check_car, corners_of, laws_of
 from hevopt.sizing.proof.modes import NotProvable
 from hevopt.studies.case import Case, dp_case
@@ -190,7 +190,7 @@ class _Proof:
         self.best_kg, self.best_theta = np.inf, (space.low + space.high) / 2
         self.shapes: list[Array] = []
         self.scale, self.solved = 0.0, 0
-        self.cell: Cell | None = None
+        self.cell: OneBattery | None = None
         if not self.solve(self.best_theta):
             raise NotProvable(
                 f"{space.base.name}: the car in the middle of the ranges does not follow the cycle; narrow them"
