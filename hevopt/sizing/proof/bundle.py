@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.sizing.proof.entries import BATTERY, ENGINE, MACHINE, Box, OneBattery, Prices
 from hevopt.sizing.proof.laws import Laws
@@ -20,8 +21,8 @@ _CLOSE = 2e-6
 _ROUNDING = 1e-10
 
 
-@dataclass(slots=True, eq=False)
-class Planes:
+@dataclass(slots=True, eq=False, repr=False)
+class Planes(Shown):
     """Entries (3, time, 4) under prices; switch: (time, mode, mode, 4) what switching costs, end: (4,)."""
 
     entries: Array
@@ -41,8 +42,8 @@ def planes_of(laws: Laws, cell: OneBattery, entries: Array, prices: Prices, scal
     return Planes(entries, switch, end, scale)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Found(Shown):
     """A bound over a box, its weights, and the mixture of corners that keeps it down, (3,)."""
 
     bound_kg: float

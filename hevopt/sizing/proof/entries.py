@@ -22,6 +22,7 @@ import numpy as np
 
 from hevopt.bounds.step_prices import line_above
 from hevopt.car.engine_laws import CompactLaw
+from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Flags
 from hevopt.sizing.proof.laws import Laws
 from hevopt.sizing.proof.modes import Mode, NotProvable
@@ -49,8 +50,8 @@ class OneBattery:
     end_j: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Prices:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Prices(Shown):
     """Prices after each step, (time,), and what they fall by over it, 0 over the first."""
 
     after: Array
@@ -139,8 +140,8 @@ class Fuel:
         return self.share * fuel + (1 - self.share) * self.idle, slope
 
 
-@dataclass(slots=True, eq=False)
-class Box:
+@dataclass(slots=True, eq=False, repr=False)
+class Box(Shown):
     """A box of sizes. low, high: (3,) factors"""
 
     low: Array

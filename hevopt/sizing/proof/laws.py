@@ -15,6 +15,7 @@ import numpy as np
 from hevopt.car.architecture import Architecture
 from hevopt.car.engine_laws import CompactLaw
 from hevopt.car.machine_laws import LossByCoefficients
+from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.driving.demand import Demand, demand_of
 from hevopt.powertrain.branches import Branch, branches
@@ -29,8 +30,8 @@ _LEVELS = 3
 MODES = 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Laws:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Laws(Shown):
     """A car's laws over the sizes of a box.
 
     modes: engine on, at rest; static: (mode, time) loss of the machine that no torque changes; c3: of its loss

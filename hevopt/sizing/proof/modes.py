@@ -17,6 +17,7 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import ENGINE
+from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.errors import DataError
 from hevopt.powertrain.branches import Branch
@@ -32,16 +33,16 @@ class NotProvable(DataError):
     """A car or a range for which there is no such proof; the message says why."""
 
 
-@dataclass(slots=True, eq=False)
-class Mode:
+@dataclass(slots=True, eq=False, repr=False)
+class Mode(Shown):
     """One mode at every step, arrays (time,) of the car of factors 1.
 
     possible: whether the driveline allows it; joined: engine and machine close one balance; turns: the machine acts
+    idles: whether the engine turns apart, without torque
     w, we: speeds of machine and engine; share, share_e: of the step in which each reaches the wheels
     driving, braking: slopes of g; y0, y1: wheel torque over mass; low0, low1: (2, time) the same of the most that
     the machine may take of the braking, as two lines, the greater of which holds
-    inertia, inertia_e: torques of the inertias of machine and engine; most, full, least: limits of machine and
-    engine idles: whether the engine turns apart, without torque
+    inertia, inertia_e: torques of the inertias of machine and engine; most, full, least: limits of the two
     """
 
     possible: Flags
