@@ -64,6 +64,9 @@ def compare(
     effects: Annotated[
         bool, typer.Option("--sensitivity", help="Add every car's sensitivities to the page.")
     ] = False,
+    forward: Annotated[
+        bool, typer.Option("--forward", help="Drive every row forward too, as `drive` does.")
+    ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
     from hevopt.commands.brought import brought_to
@@ -89,7 +92,8 @@ def compare(
     compared = partial(study.compare_cars, cars.cars, settings=settings, others=others)
     say_how_long(job.trace, compared)
     with Progress() as progress:
-        comparison = compared(job.trace, watch=study.Watch(progress, files.observe))
+        watch = study.Watch(progress, files.observe)
+        comparison = compared(job.trace, watch=watch, forward=forward)
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
     show_comparison(job, comparison, json=json, wide=wide)
     lines, of_files = files.write(job, comparison)

@@ -19,6 +19,7 @@ from hevopt.files.writing import check_writable, write_whole
 from hevopt.problem.problem import Trajectory
 from hevopt.studies.case import Case
 from hevopt.studies.comparison import Comparison
+from hevopt.studies.frames import told_forward
 from hevopt.studies.rows import Row
 
 if TYPE_CHECKING:
@@ -48,6 +49,9 @@ def result(comparison: Comparison, about: Mapping[str, Any]) -> dict[str, Any]:
     says, see `Comparison`.
     """
     rows = [row.as_dict() for row in comparison.rows]
+    if comparison.forward:
+        for row in rows:
+            row |= told_forward(comparison.forward, row["architecture"], row["strategy"])
     lost = {"lost_proofs": dict(comparison.lost_proofs)} if comparison.lost_proofs else {}
     peeking = {"peeking": comparison.peeking_by_row} if comparison.peeking else {}
     marks = {"causal": sorted(comparison.causal), **peeking}

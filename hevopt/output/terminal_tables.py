@@ -77,7 +77,7 @@ def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
     Columns that decide less leave until it is no wider than `width`, and of a failure there is one word, as its
     message is printed apart.
     """
-    columns = list(_COLUMNS)
+    columns = [*_COLUMNS, *_forward_columns(comparison)]
     if comparison.end_asked:
         columns.insert(_BATTERY_PLACE, _BATTERY)
     if width is None or needed_width(_table(comparison, columns)) <= width:
@@ -86,6 +86,26 @@ def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
     while leaving[-1].leaves and needed_width(_table(comparison, columns, brief=True)) > width:
         columns.remove(leaving.pop())
     return _table(comparison, columns, brief=True)
+
+
+def _forward_columns(comparison: Comparison) -> list[_Column]:
+    """What every row does when it is driven forward, where that was asked for."""
+
+    def of(name: str, form: str) -> Callable[[Row], str]:
+        def cell(row: Row) -> str:
+            found = comparison.forward.get((row.architecture, row.strategy))
+            value = None if found is None else getattr(found, name)
+            return "-" if value is None else format(value, form)
+
+        return cell
+
+    columns = [
+        _Column("driven\nl/100km", of("corrected_l_per_100km", ".3f"), 0),
+        _Column("against\n%", of("change_percent", "+.2f"), 0),
+        _Column("RMSSE\nkm/h", of("rmsse_kmh", ".2f"), 0),
+        _Column("missed\n", of("violations", "d"), 0),
+    ]
+    return columns if comparison.forward else []
 
 
 def left_out(table: Table) -> list[str]:
@@ -145,6 +165,22 @@ def comparison_notes(comparison: Comparison) -> str:
         f"The engine is warm from start to end; gears: {gears}."
         f"{_nox_note(comparison)}"
         f"{_lost_note(comparison)}"
+        f"{_forward_note(comparison)}"
+    )
+
+
+def _forward_note(comparison: Comparison) -> str:
+    """What the forward columns are, and what is to be known of each run beside them."""
+    if not comparison.forward:
+        return ""
+    told = [
+        f"\n{printable(car)} {printable(strategy)}, driven: {printable(found.status)}"
+        for (car, strategy), found in comparison.forward.items()
+        if found.status != "ok"
+    ]
+    return (
+        "\ndriven: forward by a driver at the pedals, charge-corrected; against: the row's own corrected fuel; "
+        "missed: times that the trace was left." + "".join(told)
     )
 
 

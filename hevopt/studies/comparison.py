@@ -21,6 +21,7 @@ from hevopt.strategies import Strategy, chosen, strategy_named
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
 from hevopt.studies.drawing import draw_rows
+from hevopt.studies.forward_rows import ForwardFigures, forward_figures
 from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row, against_reference, failed_row
 from hevopt.studies.settings import Keywords, Settings, settings_from
@@ -49,6 +50,7 @@ class Comparison(Shown):
     left_out: settings that have no meaning for some of the cars, and why
     causal: strategies of the rows that decide without knowing the rest of the cycle
     peeking: car and strategy -> what shows that a strategy from outside knows more of the cycle than it says
+    forward: architecture and strategy -> what the row does when it is driven forward, where that was asked for
     """
 
     cycle: str
@@ -62,6 +64,7 @@ class Comparison(Shown):
     left_out: Sequence[str] = ()
     causal: frozenset[str] = frozenset()
     peeking: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    forward: Mapping[tuple[str, str], ForwardFigures] = field(default_factory=dict)
 
     def _facts(self) -> dict[str, object]:
         failed = sum(not row.solved for row in self.rows)
@@ -87,7 +90,7 @@ class Comparison(Shown):
 
     def to_frame(self) -> "pd.DataFrame":
         """The rows as a table of pandas, one line each: the cycle, then the fields of `Row`, units in the names."""
-        return rows_frame(self.cycle, self.rows)
+        return rows_frame(self.cycle, self.rows, self.forward)
 
 
 # Called with what comes next, and how many of how many are done.
@@ -138,6 +141,7 @@ def compare(
     *,
     progress: Progress | None = None,
     observe: Observe | None = None,
+    forward: bool = False,
     **settings: Unpack[Keywords],
 ) -> Comparison:
     """Every strategy (by default the usual ones that fit) on every architecture (by default the shipped ones).
@@ -148,6 +152,7 @@ def compare(
     FILE.py:FUNCTION or MODULE:FUNCTION in place of a name
     progress: called with what comes next, and how many cases of how many are done
     observe: called with every solved case, its row (no reference yet), plan and trajectory
+    forward: drive every row forward as well, see `drive`
     settings: the fields of `Settings`, such as nox_weight, refine or mass_kg
     Raises DataError for a wrong name, file or setting, with those that there are. Where an engine has no NOx data,
     what asks for NOx is a failed row; UnknownNoxError if nothing else is asked.
@@ -159,7 +164,7 @@ def compare(
     cars = cars_of(architectures, told)
     drive = cycle if isinstance(cycle, Cycle) else load_cycle(cycle)
     watch = Watch(progress or unseen, observe or unobserved)
-    found = compare_cars(cars.cars, drive, told, others=others, watch=watch)
+    found = compare_cars(cars.cars, drive, told, others=others, watch=watch, forward=forward)
     return replace(found, left_out=cars.left_out)
 
 
@@ -170,8 +175,26 @@ def compare_cars(
     *,
     others: Mapping[str, Strategy] = _NO_OTHERS,
     watch: Watch = _NOBODY,
+    forward: bool = False,
 ) -> Comparison:
-    """`compare` on cars in which the settings are made already; others: strategies beside those that are known."""
+    """The strategies of the settings on cars in which the settings are made already; see `compare`.
+
+    others: strategies beside those shipped and registered; forward: drive every row forward as well
+    """
+    driven: dict[tuple[str, str], ForwardFigures] = {}
+    if forward:
+        watch = watch._replace(observe=_driving(watch.observe, settings.horizon_s, driven))
+    found = _compared(cars, cycle, settings, others, watch)
+    return replace(found, forward=driven)
+
+
+def _compared(
+    cars: Sequence[Architecture],
+    cycle: Cycle,
+    settings: Settings,
+    others: Mapping[str, Strategy],
+    watch: Watch,
+) -> Comparison:
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
@@ -211,6 +234,18 @@ def compare_cars(
         causal=causal_among(rows, peeking, others),
         peeking=peeking,
     )
+
+
+def _driving(
+    observe: Observe, horizon_s: float | None, driven: dict[tuple[str, str], ForwardFigures]
+) -> Observe:
+    """An observer that drives every solved case forward as well."""
+
+    def both(case: Case, row: Row, plan: Plan, trajectory: Trajectory) -> None:
+        observe(case, row, plan, trajectory)
+        driven[row.architecture, row.strategy] = forward_figures(case, row, trajectory, horizon_s)
+
+    return both
 
 
 def _row(
