@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOption, takes_settings
+from hevopt.commands.reporting import check_page, command_line
 from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, InfeasibleError
 
@@ -36,6 +37,9 @@ def drive(
         Path | None,
         typer.Option("--out", help="Write every step to this .csv, .parquet or .json."),
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="Write a page to this HTML file.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """A strategy driven forward, with driver, clutch and tyres, beside the backward run.
@@ -44,7 +48,7 @@ def drive(
     """
     from hevopt.commands.comparing import ComparisonJob
     from hevopt.driving.cycle import load_cycle
-    from hevopt.files.writing import check_outs
+    from hevopt.files.writing import check_outs, write_whole
     from hevopt.forward.asked import Asking
     from hevopt.output import driven_tables as tables
     from hevopt.output.file_tables import check_table_file, write_frame
@@ -55,9 +59,10 @@ def drive(
     settings = study_of(given_of("the command line", given)).settings
     job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)
     car = job.cars.cars[0]
+    check_outs({"--out": out, "--report": report}, job.inputs)
     if out is not None:
-        check_outs({"--out": out}, job.inputs)
         check_table_file(out)
+    check_page(report)
     with Progress() as progress:
         progress(f"{car.name}: {strategy}", 0, 1)
         driven = driven_by(
@@ -66,6 +71,10 @@ def drive(
         )  # fmt: skip
     if out is not None:
         write_frame(out, tables.steps_frame(driven.run), job.about)
+    if report is not None:
+        from hevopt.pages.forward.page import driven_page
+
+        write_whole(report, driven_page(driven, command_line()).encode())
     if json:
         from json import dumps
 
@@ -76,6 +85,8 @@ def drive(
         write("\n".join([tables.notes(driven), *job.cars.said()]))
         if out is not None:
             write(f"steps written to {out}")
+        if report is not None:
+            write(f"page written to {report}")
     if strict and driven.run.missed:
         raise typer.Exit(InfeasibleError.exit_status)
 
@@ -95,12 +106,16 @@ def performance(
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Tractive-force diagram: .png, .svg or .pdf.")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="Write a page to this HTML file.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """How fast cars are: from rest, in gear, top speed and slopes, with and without e-boost."""
     from hevopt.car.handling import Shifting
     from hevopt.car_files.load import load_architecture
     from hevopt.commands.terminal import listed
+    from hevopt.files.writing import check_outs, write_whole
     from hevopt.forward.performance import performance as figures_of
     from hevopt.forward.run import Handling
     from hevopt.output import performance_tables as tables
@@ -110,6 +125,8 @@ def performance(
         raise DataError("no cars; name architectures, such as A,C2")
     if plot is not None:
         _check_plot(plot)
+    check_page(report)
+    check_outs({"--plot": plot, "--report": report}, [file for car in loaded for file in car.files])
     handling = Handling() if gap is None else Handling(shifting=Shifting(gap_s=gap))
     found = []
     with Progress() as progress:
@@ -121,10 +138,13 @@ def performance(
                                handling=handling)
                 )  # fmt: skip
     if plot is not None:
-        from hevopt.files.writing import write_whole
         from hevopt.output.force_diagram import force_diagram
 
         write_whole(plot, force_diagram(found, plot.suffix.lower()[1:]))
+    if report is not None:
+        from hevopt.pages.forward.page import performance_page
+
+        write_whole(report, performance_page(found, command_line()).encode())
     if json:
         from json import dumps
 
@@ -135,6 +155,8 @@ def performance(
     write(tables.NOTE)
     if plot is not None:
         write(f"diagram written to {plot}")
+    if report is not None:
+        write(f"page written to {report}")
 
 
 def _check_plot(plot: Path) -> None:

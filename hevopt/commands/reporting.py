@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from hevopt.commands.terminal import write
+from hevopt.errors import DataError
 from hevopt.files.shown import encodable
 
 
@@ -26,3 +27,9 @@ def report(
 def command_line() -> str:
     """The command as it was given, quoted for a shell."""
     return encodable(shlex.join(["hevopt", *sys.argv[1:]]))
+
+
+def check_page(report: Path | None) -> None:
+    """DataError for a page whose name does not say that it is one."""
+    if report is not None and report.suffix.lower() not in (".html", ".htm"):
+        raise DataError(f"--report {report}: choose a name that ends in .html")

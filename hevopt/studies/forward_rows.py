@@ -7,11 +7,11 @@ from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.problem import Trajectory
 from hevopt.studies.case import Case
-from hevopt.studies.driven import Driven, DrivenPlan, drive_solved
+from hevopt.studies.driven import Manner, DrivenPlan, drive_solved
 from hevopt.studies.rows import Row
 from hevopt.units import KMH_PER_MPS
 
-_HOW = Driven()
+_HOW = Manner()
 
 
 @dataclass(frozen=True, slots=True, repr=False)

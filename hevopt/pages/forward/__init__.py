@@ -1,0 +1,1 @@
+"""Pages of cars driven forward: along a trace, and at full pedal."""

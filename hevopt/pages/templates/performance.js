@@ -1,0 +1,48 @@
+"use strict";
+// The figures of how fast cars are: the pull from rest, and forces over speed.
+
+(() => {
+  const { byId, axis, layout, figure, draw, plain } = Page;
+  const HUES = [5, 1, 3, 6, 2, 4, 8, 7, 0];
+  let data, chosen = 0;
+
+  const of = (look, n) => look.colours[HUES[n % HUES.length]];
+  const line = (x, y, name, colour, more = {}) => ({ type: "scatter", mode: "lines", x, y, name, hovertemplate: `${name}: %{y:.3~f}<extra></extra>`, ...more, line: { color: colour, width: 1.7, ...more.line } });
+
+  function pull(look, width) {
+    const traces = [];
+    data.cars.forEach((car, n) => {
+      const last = car.t.findIndex((t) => t > 40), until = last < 0 ? car.t.length : last, t = car.t.slice(0, until);
+      traces.push(line(t, car.kmh.slice(0, until), plain(car.name), of(look, n), { customdata: car.gear, hovertemplate: `${plain(car.name)}: %{y:.1f} km/h in gear %{customdata}<extra></extra>` }));
+      traces.push(line(t, car.accel.slice(0, until), plain(car.name), of(look, n), { yaxis: "y2", showlegend: false, line: { width: 1.1 } }));
+    });
+    return { data: traces, layout: layout(look, width, { hovermode: "x", margin: { l: 58, r: 14, t: 12, b: 46 },
+      yaxis: axis(look, "speed (km/h)", { domain: [0.42, 1], anchor: "x", rangemode: "tozero" }), yaxis2: axis(look, "acceleration (m/s²)", { domain: [0, 0.36], anchor: "x" }),
+      xaxis: axis(look, "time (s)", { anchor: "y2", rangemode: "tozero", zeroline: false }) }) };
+  }
+
+  function forces(look, width) {
+    const car = data.cars[chosen], traces = [], notes = [];
+    car.forces.forEach((force, n) => traces.push(line(car.speed, force, `gear ${n + 1}`, of(look, n), { line: { width: 2 } })));
+    const most = 1.06 * Math.max(car.grip, ...car.forces.flat().filter((value) => value !== null));
+    car.against.forEach(([slope, force]) => {
+      traces.push(line(car.speed, force, `${100 * slope} %`, look.muted, { showlegend: false, line: { width: 1 } }));
+      const at = Math.max(force.findIndex((value) => value > most) - 6, 0) || Math.round(0.62 * force.length);
+      if (force[at] < most) notes.push({ x: car.speed[at], y: force[at], text: `${100 * slope} %`, showarrow: false, yshift: 9, font: { size: 11, color: look.muted } });
+    });
+    traces.push(line([car.speed[0], car.speed[car.speed.length - 1]], [car.grip, car.grip], "grip", look.ink, { line: { dash: "dash", width: 1.2 } }));
+    return { data: traces, layout: layout(look, width, { hovermode: "closest", annotations: notes, margin: { l: 58, r: 14, t: 12, b: 46 },
+      xaxis: axis(look, "speed (km/h)", { range: [0, 240], zeroline: false }), yaxis: axis(look, "force at the tyres (kN)", { range: [0, most] }) }) };
+  }
+
+  Page.start((found) => {
+    data = found;
+    figure("pull", pull);
+    figure("forces", forces);
+    byId("car")?.addEventListener("change", (event) => {
+      chosen = Number(event.target.value);
+      draw("forces");
+      Page.say(`showing ${data.cars[chosen].name}`);
+    });
+  });
+})();
