@@ -26,7 +26,7 @@ def drawn_run(run: ForwardRun) -> dict[str, Any]:
     ends = np.append(np.arange(every, steps, every), steps)
     counts = np.diff(np.append(0, ends))
 
-    def mean(values: Array) -> list[float]:
+    def mean(values: Array) -> list[float | None]:
         sums = np.add.reduceat(np.nan_to_num(values), np.append(0, ends[:-1]))
         return _rounded(sums / counts)
 
@@ -100,6 +100,6 @@ def _drawn(of: Performance) -> dict[str, Any]:
     }
 
 
-def _rounded(values: Array, digits: int = 3) -> list[float]:
+def _rounded(values: Array, digits: int = 3) -> list[float | None]:
     """Plain numbers; what is not there is null in JSON."""
-    return [None if np.isnan(v) else round(float(v), digits) for v in values]  # type: ignore[misc]
+    return [None if np.isnan(v) else round(float(v), digits) for v in values]
