@@ -133,22 +133,25 @@ def follow_asked(
     line, handling = line or line_of(car), whole_handling(car, handling)
     decider.asking.check()
     exact_s, record = steps_of(cycle, step_s, handling)
-    every = max(round(decider.asking.interval_s / exact_s), 1)
-    from_s = cycle.time_s[0] + exact_s * np.append(np.arange(0, len(record), every), len(record))
+    wanted_s = np.arange(0.0, cycle.duration_s - 1e-9, decider.asking.interval_s)
+    begins = np.append(np.unique(np.round(wanted_s / exact_s).astype(np.int64)), len(record))
+    from_s = cycle.time_s[0] + exact_s * begins
     # Nothing is planned, so that there is no charge to be kept.
     driver = handling.driver._replace(charge_per_s=0.0)
     driven = loop_car(car, line, handling._replace(driver=driver))
     gears, step, task = _undecided(cycle, from_s, planned)
     work, loop = col.work_of(driven.ways), col.begun(driven, task, float(planned.energy_j[0]))
-    for d, (at_s, k) in enumerate(zip(from_s[:-1].tolist(), step.tolist(), strict=True)):
+    for d, at_s in enumerate(from_s[:-1].tolist()):
+        # A step of the driven car may begin a little before the cycle's.
+        k = int(step[d]) if decider.points is not None else min(d, len(gears) - 1)
         look = col.seen(driven, task, loop, at_s, decider.asking.interval_s, exact_s)
         command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
         task.way[d] = line.index(command.listed or int(gears[k]), command.gears)
         task.engine_on[d], task.machine_nm[d] = command.engine_on, command.machine_nm
         if d == 0:
             loop = col.begun(driven, task, loop.energy_j)
-        part = record[d * every : (d + 1) * every]
-        loop = col.advance(driven, task, work, loop, d * every, part, exact_s)
+        part = record[begins[d] : begins[d + 1]]
+        loop = col.advance(driven, task, work, loop, int(begins[d]), part, exact_s)
     planned_j = np.asarray(planned.energy_j, dtype=np.float64)
     return run_of(car, cycle, task, planned_j, line, handling, record, exact_s)
 

@@ -7,7 +7,7 @@ from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.problem import Trajectory
 from hevopt.studies.case import Case
-from hevopt.studies.driven import Manner, DrivenPlan, drive_solved
+from hevopt.studies.driven import DrivenPlan, Manner, drive_solved
 from hevopt.studies.rows import Row
 from hevopt.units import KMH_PER_MPS
 
