@@ -1,7 +1,7 @@
 """Operating points apart from a cycle: gear, speed and torque at the wheels, each a row of a control table.
 
 Who decides while driving looks up the row nearest to where the car is. The rows stand where a cycle's do: for each
-of its gears an even grid over the speeds and torques that it asks for there, and a little beyond. A row's
+of its gears every point that it asks for, so that a cruise is met exactly, and an even grid around these. A row's
 acceleration is that of a level road, its switching that of its own mean speed, and no gear is changed in it.
 """
 
@@ -26,14 +26,12 @@ _BEYOND = 2
 _BROADEST = 400
 
 
-class GearGrid(NamedTuple):
-    """The rows of a gear: first one that stands, then speeds, the lowest first, each with all torques."""
+class GearRows(NamedTuple):
+    """The rows of a gear: the first stands, the others are at these speeds and torques at the wheels, (row,)."""
 
     first: int
-    speed_mps: float
-    speeds: int
-    torque_nm: float
-    torques: int
+    speed_mps: Array
+    wheel_nm: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -41,19 +39,18 @@ class OperatingPoints(Shown):
     """A problem whose steps are operating points, in no order; by_gear: gear -> its rows."""
 
     problem: Problem
-    by_gear: dict[int, GearGrid]
+    by_gear: dict[int, GearRows]
 
     def row(self, gear: int, speed_mps: float, wheel_nm: float) -> int:
         """The row nearest to a gear, a speed and a torque; of the nearest gear where there is none of that gear."""
-        grid = self.by_gear.get(gear)
-        if grid is None:
-            grid = self.by_gear[min(self.by_gear, key=lambda known: (abs(known - gear), known))]
+        rows = self.by_gear.get(gear)
+        if rows is None:
+            rows = self.by_gear[min(self.by_gear, key=lambda known: (abs(known - gear), known))]
         if speed_mps <= 0.0:
-            return grid.first
-        i = round((speed_mps - grid.speed_mps) / SPEED_STEP_MPS)
-        j = round((wheel_nm - grid.torque_nm) / TORQUE_STEP_NM)
-        i, j = min(max(i, 0), grid.speeds - 1), min(max(j, 0), grid.torques - 1)
-        return grid.first + 1 + i * grid.torques + j
+            return rows.first
+        away = ((rows.speed_mps - speed_mps) / SPEED_STEP_MPS) ** 2
+        away += ((rows.wheel_nm - wheel_nm) / TORQUE_STEP_NM) ** 2
+        return rows.first + 1 + int(np.argmin(away))
 
 
 def points_of(car: Architecture, problem: Problem, levels: int = TORQUE_LEVELS) -> OperatingPoints:
@@ -61,48 +58,50 @@ def points_of(car: Architecture, problem: Problem, levels: int = TORQUE_LEVELS) 
     signals = problem.table.signals
     assert signals is not None  # build_problem gives them
     step_s = float(np.median(problem.table.step_s))
-    grids, demand = _grids(car, signals, step_s)
+    by_gear, demand = _rows(car, signals, step_s)
     table = build_table(car, demand, levels=levels, allow_shortfall=True, apart=True)
     rows = Problem(
         table, problem.battery, problem.soc_start, problem.soc_end_min, 0, problem.nox_weight
     )
-    return OperatingPoints(with_dwell(rows, car.engine.least_on_s, car.engine.least_off_s), grids)
+    return OperatingPoints(with_dwell(rows, car.engine.least_on_s, car.engine.least_off_s), by_gear)
 
 
-def _grids(
-    car: Architecture, signals: Signals, step_s: float
-) -> tuple[dict[int, GearGrid], Demand]:
+def _rows(car: Architecture, signals: Signals, step_s: float) -> tuple[dict[int, GearRows], Demand]:
     moving = signals.speed_mps > 0
     gears = np.where(signals.gear > 0, signals.gear, 1) if car.gear == "cycle" else 1
     listed = np.broadcast_to(gears, signals.speed_mps.shape)
     radius = car.vehicle.tyre_radius_m
     wheel_nm = np.zeros_like(signals.speed_mps)
     np.divide(signals.wheel_power_w, signals.speed_mps / radius, out=wheel_nm, where=moving)
-    grids: dict[int, GearGrid] = {}
-    parts: list[tuple[Array, Array, int]] = []
+    found: dict[int, GearRows] = {}
     first = 0
-    for gear in np.unique(listed[moving]) if moving.any() else [1]:
+    for gear in np.unique(listed[moving]).tolist() if moving.any() else [1]:
         here = moving & (listed == gear)
-        speeds = _even(signals.speed_mps[here], SPEED_STEP_MPS)
-        speeds = speeds[speeds > 0]
-        torques = _even(wheel_nm[here], TORQUE_STEP_NM)
-        grids[int(gear)] = GearGrid(
-            first, float(speeds[0]), len(speeds), float(torques[0]), len(torques)
-        )
-        parts.append((speeds, torques, int(gear)))
-        first += 1 + len(speeds) * len(torques)
-    speed: Array = np.concatenate([np.append(0.0, np.repeat(s, len(t))) for s, t, _ in parts])
-    torque: Array = np.concatenate([np.append(0.0, np.tile(t, len(s))) for s, t, _ in parts])
-    gear = np.concatenate([np.append(0, np.full(len(s) * len(t), g)) for s, t, g in parts])
-    force = torque / radius - tractive_force_n(
-        car.vehicle, speed, np.zeros_like(speed), np.zeros_like(speed)
-    )
+        found[gear] = _of_gear(first, signals.speed_mps[here], wheel_nm[here])
+        first += 1 + len(found[gear].speed_mps)
+    speed: Array = np.concatenate([np.append(0.0, rows.speed_mps) for rows in found.values()])
+    torque: Array = np.concatenate([np.append(0.0, rows.wheel_nm) for rows in found.values()])
+    gear_of = [np.append(0, np.full(len(rows.speed_mps), g)) for g, rows in found.items()]
+    level = np.zeros_like(speed)
+    force = torque / radius - tractive_force_n(car.vehicle, speed, level, level)
     accel = np.where(speed > 0, force / car.vehicle.equivalent_mass_kg, 0.0)
     begins: Array = np.asarray(step_s * np.arange(len(speed)), dtype=np.float64)
-    return grids, Demand(
+    return found, Demand(
         begins, np.full(len(speed), step_s), speed, torque, speed / radius, accel / radius,
-        gear, np.zeros(len(speed), dtype=bool),
+        np.concatenate(gear_of), np.zeros(len(speed), dtype=bool),
     )  # fmt: skip
+
+
+def _of_gear(first: int, speed_mps: Array, wheel_nm: Array) -> GearRows:
+    """Each point of a cycle in a gear once, then the grid around them."""
+    own = np.unique(np.round(np.stack([speed_mps, wheel_nm]), 6), axis=1)
+    speeds, torques = _even(speed_mps, SPEED_STEP_MPS), _even(wheel_nm, TORQUE_STEP_NM)
+    speeds = speeds[speeds > 0]
+    return GearRows(
+        first,
+        np.concatenate([own[0], np.repeat(speeds, len(torques))]),
+        np.concatenate([own[1], np.tile(torques, len(speeds))]),
+    )
 
 
 def _even(values: Array, step: float) -> Array:
