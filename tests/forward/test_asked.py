@@ -67,9 +67,7 @@ def test_only_strategies_that_need_not_know_the_cycle_decide():
 
 def test_a_row_is_found_by_where_it_stands(solved):
     _, problem, points, _ = solved
-    signals, radius = points.problem.table.signals, 0.0
-    car = solved[0]
-    radius = car.vehicle.tyre_radius_m
+    signals, radius = points.problem.table.signals, solved[0].vehicle.tyre_radius_m
     for row in (0, 1, 57, len(signals.gear) - 1):
         speed = float(signals.speed_mps[row])
         torque = float(signals.wheel_power_w[row]) * radius / speed if speed else 0.0
@@ -81,14 +79,24 @@ def test_a_row_is_found_by_where_it_stands(solved):
     )
 
 
+def test_every_step_of_the_cycle_is_an_operating_point(solved):
+    _, problem, points, _ = solved
+    asked, rows = problem.table.signals, points.problem.table.signals
+    for k in np.flatnonzero(asked.speed_mps > 0).tolist():
+        torque = asked.wheel_power_w[k] / asked.speed_mps[k] * solved[0].vehicle.tyre_radius_m
+        row = points.row(int(asked.gear[k]), float(asked.speed_mps[k]), float(torque))
+        assert rows.wheel_power_w[row] == pytest.approx(asked.wheel_power_w[k], abs=1e-3)
+
+
 def test_an_operating_point_is_the_step_of_a_cycle_at_that_speed_and_torque(solved):
-    """Driven at 12 m/s with the point's acceleration for a hundredth of a second, in third gear."""
+    """Driven with the point's speed and acceleration for a hundredth of a second, in third gear."""
     car, _, points, _ = solved
     row, table = points.row(3, 12.0, 150.0), points.problem.table
-    torque = table.signals.wheel_power_w[row] / 12.0 * car.vehicle.tyre_radius_m
-    at_rest = tractive_force_n(car.vehicle, np.array([12.0]), np.zeros(1), np.zeros(1))[0]
+    mean = float(table.signals.speed_mps[row])
+    torque = table.signals.wheel_power_w[row] / mean * car.vehicle.tyre_radius_m
+    at_rest = tractive_force_n(car.vehicle, np.array([mean]), np.zeros(1), np.zeros(1))[0]
     accel = (torque / car.vehicle.tyre_radius_m - at_rest) / car.vehicle.equivalent_mass_kg
-    speed = 12.0 + accel * np.array([-0.005, 0.005])
+    speed = mean + accel * np.array([-0.005, 0.005])
     short = Cycle(
         "short", np.array([0.0, 0.01]), speed, np.zeros(2), np.array([3, 3]), np.zeros(2, bool)
     )
@@ -107,7 +115,8 @@ def test_a_start_at_an_operating_point_takes_the_engines_energy_there(solved):
     table, turning = points.problem.table, turning_modes(points.problem)
     off, on = np.flatnonzero(~turning)[0], np.flatnonzero(turning)[0]
     row = points.row(3, 12.0, 100.0)
-    ratio = car.gearbox.ratios[3] * 12.0 / car.vehicle.tyre_radius_m
+    speed = float(table.signals.speed_mps[row])
+    ratio = car.gearbox.ratios[3] * speed / car.vehicle.tyre_radius_m
     taken = 0.5 * car.engine.inertia_kgm2 * ratio**2 / car.machines[0].spin_efficiency
     assert table.switch_energy_j[row, off, on] == pytest.approx(taken, rel=0.01)
     assert table.switch_energy_j[row, on, on] == table.switch_energy_j[row, off, off] == 0
