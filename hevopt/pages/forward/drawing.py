@@ -84,6 +84,7 @@ def _drawn(of: Performance) -> dict[str, Any]:
     weight = of.car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
     some, thin = slice(None, None, 6), slice(None, None, max(len(trace) // _PULL_POINTS, 1))
     accel = np.gradient(trace[:, pull.SPEED], STEP_S)
+    at_s: Array = np.linspace(STEP_S, STEP_S * len(trace), len(trace))
     return {
         "name": of.name,
         "speed": _rounded(speed[some]),
@@ -93,7 +94,7 @@ def _drawn(of: Performance) -> dict[str, Any]:
             for slope in SLOPES
         ],
         "grip": curves.grip_n / 1e3,
-        "t": _rounded(STEP_S * np.arange(1, len(trace) + 1)[thin]),
+        "t": _rounded(at_s[thin]),
         "kmh": _rounded(trace[thin, pull.SPEED] * KMH_PER_MPS),
         "accel": _rounded(accel[thin]),
         "gear": (trace[thin, pull.GEAR] + 1).astype(int).tolist(),
