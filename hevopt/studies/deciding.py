@@ -6,14 +6,19 @@ from hevopt.errors import DataError
 from hevopt.forward.asked import Asking, Decider
 from hevopt.powertrain.points import points_of
 from hevopt.problem.holding import with_holding
-from hevopt.strategies import strategy_named
+from hevopt.strategies import every_strategy, strategy_named
 from hevopt.studies.case import Case
 from hevopt.studies.solved import told
 
 
 def decides(strategy: str) -> bool:
-    """Whether a strategy can decide on the way: from operating points, or along its preview of the cycle."""
-    known = strategy_named(strategy)
+    """Whether a strategy can decide on the way: from operating points, or along its preview of the cycle.
+
+    One that is only brought along with a call cannot: its plan is replayed.
+    """
+    known = every_strategy().get(strategy)
+    if known is None:
+        return False
     return known.start_on is not None or (known.previews and known.start is not None)
 
 

@@ -12,11 +12,15 @@ from hevopt.output.tables import needed_width
 
 
 @pytest.fixture(scope="module")
-def comparison():
+def hop():
     time_s = np.arange(41.0)
     speed = np.interp(time_s, [0, 5, 15, 25, 35, 40], [0, 0, 10, 10, 0, 0])
-    cycle = Cycle("hop", time_s, speed, np.zeros(41))
-    return compare(cycle, ["C2", "series_1500"], ["dp", "conventional"], forward=True)
+    return Cycle("hop", time_s, speed, np.zeros(41))
+
+
+@pytest.fixture(scope="module")
+def comparison(hop):
+    return compare(hop, ["C2", "series_1500"], ["dp", "conventional"], forward=True)
 
 
 def test_every_row_has_its_forward_figures_or_says_why_it_was_not_driven(comparison):
@@ -29,6 +33,14 @@ def test_every_row_has_its_forward_figures_or_says_why_it_was_not_driven(compari
         left_out = comparison.forward["series_1500", name]
         assert left_out.fuel_l_per_100km is None and left_out.status.startswith("not driven: ")
         assert "series_1500" in left_out.status
+
+
+def test_the_plan_of_a_strategy_that_is_brought_along_is_replayed(hop):
+    from hevopt.strategies import dp
+
+    found = compare(hop, ["C2"], {"mine": lambda problem: dp.solve(problem).control}, forward=True)
+    assert found.forward["C2", "mine"].decided is False
+    assert found.forward["C2", "mine"].violations == 0
 
 
 def test_tables_json_and_frames_have_the_forward_columns(comparison):
