@@ -83,6 +83,7 @@ def _packed(data: Mapping[str, Any]) -> bytes:
 def _alerts(driven: DrivenPlan) -> list[Alert]:
     run, left = driven.run, driven.run.quality.violations
     full_s = float(run.full.sum() * run.step_s)
+    given = f"all is given, and is too little, for {full_s:.1f} s" if full_s else "never too little"
     charge = [mark for mark in driven.marks if "charge" in mark]
     maps = [mark for mark in driven.marks if "map" in mark]
     open_ = [
@@ -97,7 +98,7 @@ def _alerts(driven: DrivenPlan) -> list[Alert]:
     return [
         Alert("Trace", bool(left), [trace_text(run)]),
         Alert("Charge", bool(charge), charge or ["neutral within 1 % of the fuel's energy, in its window"]),
-        Alert("Full load", full_s > 0, [f"all is given, and is too little, for {full_s:.1f} s"], grave=False),
+        Alert("Full load", full_s > 0, [given], grave=False),
         Alert("Measured maps", bool(maps), maps or ["never left"]),
         Alert("Balances", bool(open_), open_ or ["every component balances to rounding"]),
         Alert("What the bound is", True, bound, grave=False),
