@@ -22,11 +22,9 @@ def kinds_of_rows() -> dict[str, type]:
 def told_forward(
     forward: Mapping[tuple[str, str], ForwardFigures], car: str, strategy: str
 ) -> dict[str, Any]:
-    """A row's forward figures by name, and whether it decided as text; those of a row that was not solved."""
+    """A row's forward figures by name; those that say so where the row was not solved."""
     figures = forward.get((car, strategy), ForwardFigures("not driven: the row has no plan"))
-    found = figures.as_dict()
-    decided = found["forward_decided"]
-    return found | {"forward_decided": None if decided is None else str(decided).lower()}
+    return figures.as_dict()
 
 
 def _kinds(of: type) -> dict[str, type]:

@@ -46,7 +46,7 @@ def test_the_plan_of_a_strategy_that_is_brought_along_is_replayed(hop):
 def test_tables_json_and_frames_have_the_forward_columns(comparison):
     frame = comparison.to_frame()
     assert frame["forward_violations"].tolist()[0] == 0
-    assert frame["forward_decided"].tolist()[:2] == ["false", "true"]
+    assert frame["forward_decided"].tolist()[:2] == [False, True]
     rows = json.loads(file_tables.result_json(comparison, {}))["rows"]
     assert rows[0]["forward_change_percent"] == comparison.forward["C2", "dp"].change_percent
     assert rows[2]["forward_fuel_l_per_100km"] is None
