@@ -17,6 +17,7 @@ from hevopt.car.vehicle import Vehicle
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery
+from hevopt.problem.thresholds import Thresholds
 
 Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
 
@@ -39,6 +40,7 @@ class Architecture(Shown):
     gearbox: with the shift speeds; None without one whose gear the cycle lists
     machines: in the order of the driveline's
     soc_end: least state of charge at the end of a cycle
+    thresholds: of the rules, as far as the file gives them
     contents: keys and values as read, changes made, the components' tables in place of their names
     files: where they were read from, the architecture first
     weighed: key of engine, machines and battery -> what each weighs and costs
@@ -56,6 +58,7 @@ class Architecture(Shown):
     soc_end: float
     driveline: Driveline
     functions: frozenset[str]
+    thresholds: Thresholds
     gear: Literal["cycle", "free"]
     contents: Mapping[str, Any]
     files: tuple[Path, ...]

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Discriminator, Field, model_validator
 from hevopt.car.architecture import Function
 from hevopt.car.templates import COMPONENTS_OF
 from hevopt.car_files.driveline import CouplingFile
-from hevopt.car_files.fields import Description, Name, Named, Table
+from hevopt.car_files.fields import Description, Name, Named, NotNegative, Soc, Table
 from hevopt.files.toml import FileModel
 
 
@@ -25,6 +25,14 @@ Component = Annotated[
 ]
 
 
+class RulesFile(FileModel):
+    """Thresholds of the rules; what is left out is calibrated on the cycle."""
+
+    electric_soc: Soc | None = None
+    electric_power_w: NotNegative | None = None
+    electric_speed_kmh: Annotated[float, Field(ge=0, le=1000)] | None = None
+
+
 class ArchitectureFile(FileModel):
     """An architecture: its components, functions (Table 1) and coupling."""
 
@@ -40,6 +48,7 @@ class ArchitectureFile(FileModel):
     hybrid_mass_kg: Annotated[float, Field(ge=-500, le=5000)] = 0.0
     functions: list[Function]
     gear: Literal["cycle", "free"] = "cycle"
+    rules: RulesFile | None = None
     coupling: CouplingFile
 
     @model_validator(mode="after")

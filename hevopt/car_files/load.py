@@ -11,7 +11,7 @@ from hevopt.car.engine import no_engine
 from hevopt.car.machine import Machine
 from hevopt.car.templates import TEMPLATES, WITHOUT_GEARBOX, Options
 from hevopt.car.transmission import Gearbox
-from hevopt.car_files.architecture import ArchitectureFile
+from hevopt.car_files.architecture import ArchitectureFile, RulesFile
 from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
 from hevopt.car_files.components import battery_of, engine_of, gearbox_of, machine_of, vehicle_of
@@ -26,6 +26,7 @@ from hevopt.files.keypaths import merged, with_changes
 from hevopt.files.lookup import find, is_path, shipped_folder
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, Model, checked, read_contents
+from hevopt.problem.thresholds import OPEN, Thresholds
 from hevopt.units import TO_SI
 
 Built = TypeVar("Built")
@@ -79,6 +80,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         soc_end=soc.start if soc.end is None else soc.end,
         driveline=_driveline(path, data, gearbox, placed),
         functions=frozenset(data.functions),
+        thresholds=_thresholds(data.rules),
         gear="cycle",
         contents=contents,
         files=tuple(files),
@@ -126,6 +128,14 @@ def _driveline(
             "or more; choose another gearbox or kind"
         )
     return TEMPLATES[kind](kind, options, gearbox, machines["machine"])
+
+
+def _thresholds(data: RulesFile | None) -> Thresholds:
+    if data is None:
+        return OPEN
+    kmh = data.electric_speed_kmh
+    speed_mps = None if kmh is None else kmh * TO_SI["_kmh"][1]
+    return Thresholds(data.electric_soc, data.electric_power_w, speed_mps)
 
 
 def _not_there(path: Path, key: str, changes: Mapping[str, Any]) -> str:

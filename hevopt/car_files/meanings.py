@@ -23,7 +23,13 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "hybrid_mass_kg": ("kg", "mass that the architecture adds to the car's"),
         "functions": ("", "what the hybrid may do; what is left out is forbidden to every strategy"),
         "gear": ("", 'who chooses the engine\'s gear: the cycle (or shift speeds), or "free": the strategy'),
+        "rules": ("", "thresholds of the rules; what is left out is calibrated on the cycle"),
         "coupling": ("", "how engine and machines join the wheels"),
+    },
+    "RulesFile": {
+        "electric_soc": ("-", "state of charge above which the car drives electrically"),
+        "electric_power_w": ("W", "up to this power at the wheels; above it the engine is on"),
+        "electric_speed_kmh": ("km/h", "and up to this speed"),
     },
     "CouplingFile": {
         "kind": ("", "where the machine sits: none (alternator), belt (on the engine), crankshaft, gearbox "

@@ -1,6 +1,7 @@
 """Tables for the terminal: a comparison, the published figures beside it, the calibration of a rule."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import Any, Literal, NamedTuple
 
 from rich import box
@@ -13,6 +14,7 @@ from hevopt.problem.problem import Plan
 from hevopt.reproduction.published import published_beside
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row, end_asked_text, marked, no_reference_text
+from hevopt.units import KMH_PER_MPS
 
 _CAUSAL_MARK = "†"
 
@@ -240,6 +242,10 @@ def published_table(comparison: Comparison) -> Table | None:
     return table
 
 
+def _or_any(limit: float, digits: int) -> str:
+    return f"{limit:.{digits}f}" if isfinite(limit) else "any"
+
+
 def calibration_table(plan: Plan) -> Table | None:
     """The calibration curve of a rule-based strategy; None for the others."""
     members: list[Mapping[str, Any]] = plan.notes.get("calibration", [])
@@ -248,14 +254,15 @@ def calibration_table(plan: Plan) -> Table | None:
     title = "calibration: * taken; passed over: the end charge is worth more than 1 % of the cost"
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     capped = "nox_cap_kgps" in members[0]
-    heads = ["electric below kW", *(["NOx cap mg/s"] if capped else []), "cost kg", "corrected kg",
-             "NOx g", "end surplus kJ", "passed over", ""]  # fmt: skip
+    heads = ["electric below kW", "below km/h", "above SOC", *(["NOx cap mg/s"] if capped else []),
+             "cost kg", "corrected kg", "NOx g", "end surplus kJ", "passed over", ""]  # fmt: skip
     for head in heads:
         table.add_column(head, justify="right")
     for n, member in enumerate(members):
         cap = [f"{member['nox_cap_kgps'] * 1e6:.2f}"] if capped else []
         table.add_row(
-            f"{member['threshold_w'] / 1e3:.2f}", *cap,
+            _or_any(member["threshold_w"] / 1e3, 2), _or_any(member["threshold_mps"] * KMH_PER_MPS, 0),
+            f"{member['threshold_soc']:.2f}", *cap,
             f"{member['cost_kg']:.5f}", f"{member['corrected_kg']:.5f}",
             f"{member['nox_kg'] * 1e3:.3f}", f"{member['surplus_j'] / 1e3:+.1f}",
             "" if member["eligible"] else "yes", "*" if n == plan.notes["chosen"] else "",

@@ -59,6 +59,7 @@ def build_problem(
     problem = Problem(
         table, architecture.battery, architecture.soc_start, architecture.soc_end, 0, nox_weight,
         1 / ELECTRICITY_JPKG if architecture.electric else 0.0,
+        architecture.thresholds,
     )  # fmt: skip
     engine = architecture.engine
     return with_dwell(problem, engine.least_on_s, engine.least_off_s)

@@ -18,6 +18,7 @@ from hevopt.problem.arrays import Array
 from hevopt.problem.battery import Battery, energy_j, within_limits
 from hevopt.problem.reject import Reject
 from hevopt.problem.table import ControlTable
+from hevopt.problem.thresholds import OPEN, Thresholds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +33,7 @@ class Problem(Shown):
     start_mode: mode before the first step
     nox_weight: kg of fuel that a kg of NOx counts
     electricity_kgpj: kg of fuel that a joule from the battery's terminals counts; 0 but in a car without an engine
+    thresholds: what the rules' thresholds are where they are not calibrated
     cost_kg: (time, control) what a step counts: fuel plus weighted NOx and electricity
     start_j, end_min_j, window_j: stored energy before the first step, least at the end, at the window's ends
     A control whose power the battery cannot deliver or take at every state of charge of its window is rejected.
@@ -44,6 +46,7 @@ class Problem(Shown):
     start_mode: int = 0
     nox_weight: float = 0.0
     electricity_kgpj: float = 0.0
+    thresholds: Thresholds = OPEN
     cost_kg: Array = field(init=False)
     start_j: float = field(init=False)
     end_min_j: float = field(init=False)
@@ -57,6 +60,13 @@ class Problem(Shown):
                     f"{name} {getattr(self, name):g} lies outside the SOC window; allowed: "
                     f"{low:g} to {high:g}"
                 )
+        if self.thresholds.electric_soc is not None and not (
+            low <= self.thresholds.electric_soc <= high
+        ):
+            raise DataError(
+                f"rules: electric_soc {self.thresholds.electric_soc:g} lies outside the SOC window; allowed: "
+                f"{low:g} to {high:g}, or leave it out to have it calibrated"
+            )
         if not (np.isfinite(self.nox_weight) and 0 <= self.nox_weight <= 1e6):
             raise DataError(f"nox_weight {self.nox_weight}; allowed: 0 to 1e6 kg fuel per kg NOx")
         if not 0 <= self.start_mode < self.table.modes:

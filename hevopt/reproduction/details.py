@@ -8,6 +8,7 @@ from hevopt.reproduction.energies import Balance
 from hevopt.reproduction.members import Member, least_penalty
 from hevopt.reproduction.published import HYBRIDS, STATEMENTS, Statement
 from hevopt.reproduction.verdicts import markdown, signed
+from hevopt.units import KMH_PER_MPS
 
 # Points of fuel within which members of a curve count as equals.
 _NEAR_LEAST_FUEL = 2.0
@@ -54,13 +55,15 @@ def curves(found: Reproduction) -> str:
     rows.append(["calibrated", *_changes(calibrated)])
     heads = ["electric below, kW"]
     heads += [f"{car} {what}, %" for car in HYBRIDS for what in ("fuel", "NOx")]
-    at = ", ".join(
-        f"{car} {m.threshold_w / 1e3:.2f}" for car, m in zip(HYBRIDS, calibrated, strict=True)
+    at = "; ".join(
+        f"{car} {m.threshold_w / 1e3:.2f} kW, {m.threshold_mps * KMH_PER_MPS:.0f} km/h, {m.threshold_soc:.2f}"
+        for car, m in zip(HYBRIDS, calibrated, strict=True)
     )
     text = (
         "The calibration curve of `conventional`: change against A over the power threshold "
-        "below which the car drives electrically, every kW. The calibration itself tries other, "
-        f"finer thresholds; what it takes, the `conventional` of this page, is the last row ({at} kW)."
+        "below which the car drives electrically, every kW, at the calibrated speed and charge. The "
+        "calibration itself tries other, finer thresholds, all three together; what it takes, the "
+        f"`conventional` of this page, is the last row (up to a power and a speed, above a state of charge: {at})."
     )
     passes = [f"- {s.cars[0]}: {_passes(found, s)}" for s in STATEMENTS if s.section == 2]
     return "\n\n".join(

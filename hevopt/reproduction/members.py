@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle
@@ -17,7 +18,8 @@ CURVE_KW = tuple(range(15))
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A member of a rule family against another case, per cent; electric driving below the threshold.
+    """A member of a rule family against another case, per cent; electric driving below its power and speed and
+    above its state of charge.
 
     driven_percent: fuel as driven; surplus_percent: stored energy at the end above the start's, of the fuel's
     neutral: that is at most 1 %, as for rows, and the charge stays in its window
@@ -31,13 +33,22 @@ class Member:
     surplus_percent: float
     neutral: bool
     passed_over: bool = False
+    threshold_mps: float = inf
+    threshold_soc: float = 0.0
 
 
 def curve(
     shipped: Varied, base: Figures, thresholds_kw: Sequence[float] = CURVE_KW
 ) -> list[Member]:
-    """The members of conventional over its threshold, against `base`."""
-    plan = conventional.solve(shipped.problem, thresholds_w=[1e3 * kw for kw in thresholds_kw])
+    """The members of conventional over its power threshold, the others as calibrated, against `base`."""
+    notes = conventional.solve(shipped.problem).notes
+    best = notes["calibration"][notes["chosen"]]
+    plan = conventional.solve(
+        shipped.problem,
+        thresholds_w=[1e3 * kw for kw in thresholds_kw],
+        thresholds_mps=[best["threshold_mps"]],
+        thresholds_soc=[best["threshold_soc"]],
+    )
     return _members(shipped, plan, base)
 
 
@@ -69,6 +80,8 @@ def _members(shipped: Varied, plan: Plan, base: Figures) -> list[Member]:
                 surplus_percent=surplus,
                 neutral=member["inside"] and abs(surplus) <= NEUTRAL_PERCENT,
                 passed_over=not member["eligible"],
+                threshold_mps=member["threshold_mps"],
+                threshold_soc=member["threshold_soc"],
             )
         )
     return found

@@ -204,12 +204,12 @@ def _own_rules(found: Reproduction) -> str:
     heads = ["car", "members that are not neutral", "passed over", "fuel of the best neutral one, %",
              "fuel of the best of all, %", "least fuel of `nox_cut` against `conventional`, %"]  # fmt: skip
     text = (
-        "`conventional` shifts the engine's load upwards only. Where braking gives back more "
-        "than a low threshold uses, it cannot spend the rest: such members are not neutral. The "
-        "calibration passes over all whose end charge is worth more than 1 % of the fuel, which may be "
-        "neutral ones too: a joule of charge saves more than one of fuel. The members are those of "
+        "`conventional` shifts the engine's load up and down: where braking gives back more than a low "
+        "threshold uses, the machine assists with the rest. Before it shifted upwards only, and such members "
+        "were not neutral. The calibration passes over all whose end charge is worth more than 1 % of the fuel, "
+        "which may be neutral ones too: a joule of charge saves more than one of fuel. The members are those of "
         "the table in section 2, the calibrated one included; what the stars stand for is said there. "
-        "`nox_cut` may assist. Cars with a member of its family that burns less than their "
+        "`nox_cut` caps NOx besides. Cars with a member of its family that burns less than their "
         "`conventional`, which is then not the best rule of its kind: "
         f"{', '.join(better) or 'none'}."
     )

@@ -99,7 +99,7 @@ def _mean_nox_of(cars: tuple[str, ...]) -> Statement:
 
 
 _ENGAGED = "ours keeps the engine on in every K phase; without that it is close"
-_OPEN = "ours has no speed threshold; what share of the braking theirs takes is not said: hevopt reproduction"
+_OPEN = "thresholds of theirs, and the share of the braking that it takes, are not said: hevopt reproduction"
 _IDLE = "NOx of the map at idle, engine on in the K phases: hevopt reproduction"
 _MAP = "NOx map, and thresholds calibrated for fuel alone: hevopt reproduction"
 _SEVERE = "ours takes the family's least NOx, whatever it costs in fuel"

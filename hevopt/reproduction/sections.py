@@ -65,8 +65,8 @@ def fuel_of_b(found: Reproduction) -> str:
 def fuel_of_hybrids(found: Reproduction) -> str:
     """Section 2."""
     text = (
-        "The study drives electrically up to some power or speed and gives neither. Ours takes the "
-        "power threshold of least fuel and no speed threshold. Ours brakes with the machine by a "
+        "The study drives electrically above some charge up to some power or speed and gives none of "
+        "them. Ours takes the three that together burn least. Ours brakes with the machine by a "
         "share over speed, from none at standstill to 0.8 at 97 km/h; the friction brakes take the "
         "rest. What the study lets its machine take is not in its text. The inertia of engine and "
         "machine is charged on their own shafts, in A and in the hybrids alike; a start spins the "

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.problem._battery_kernels import BatteryArrays, chemical_power_at
+from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices, State
 
@@ -23,6 +23,15 @@ class Rule(NamedTuple):
     modes: Indices
     least_j: float
     price_kgpj: float
+
+
+class Span(NamedTuple):
+    """Where a drive starts, what must be left at its end, and between which stored energies it may stay."""
+
+    start: State
+    end_j: float
+    least_j: float
+    greatest_j: float
 
 
 class RuleDrive(NamedTuple):
@@ -103,7 +112,7 @@ def entry_at(
 
 
 @compiled()
-def _drive(
+def drive_on(
     rule: Rule,
     engine: Indices,
     begin: int,
@@ -111,21 +120,34 @@ def _drive(
     battery: BatteryArrays,
     driven: RuleDrive,
 ) -> float:
-    """Drive on from a step with the engine's entries, (time,); the stored energy at the end."""
+    """Drive on from a step with the engine's entries, (time,); the stored energy at the end.
+
+    Each step takes what `entry_at` says, written out, as calls with all the arrays take longer than the step.
+    """
     power, step_s = choices.power_w, choices.step_s
-    case, _, switch_j, _ = choices.switching
-    modes, (entry, energy, mode) = rule.modes, driven
+    case, _, switch_j, allowed = choices.switching
+    (electric, fixed, modes, least_j, price_kgpj), efficiency = rule, battery.coulombic_efficiency
+    entry, energy, mode = driven
+    stored, before = energy[begin], mode[begin]
     for k in range(begin, len(step_s)):
-        chosen = entry_at(rule, engine, k, energy[k], mode[k], choices)
-        between = energy[k] - switch_j[case[k], mode[k], modes[chosen]]
-        entry[k], mode[k + 1] = chosen, modes[chosen]
-        energy[k + 1] = between - step_s[k] * chemical_power_at(power[chosen], between, battery)
+        chosen = fixed[k] if fixed[k] >= 0 else engine[k]
+        if electric[k] >= 0 and stored > least_j:
+            chosen = electric[k]
+        if not allowed[case[k], before, modes[chosen]]:
+            chosen = permitted(chosen, k, before, modes, price_kgpj, choices)
+        after = modes[chosen]
+        between = stored - switch_j[case[k], before, after]
+        _, voltage, discharge, charging = state_at(between, battery)
+        drain_w = chemical_power(power[chosen], voltage, discharge, charging, efficiency)
+        stored, before = between - step_s[k] * drain_w, after
+        entry[k], mode[k + 1], energy[k + 1] = chosen, after, stored
     end_j: float = energy[-1]
     return end_j
 
 
 @compiled()
-def _at_rest(steps: int, start: State) -> RuleDrive:
+def at_rest(steps: int, start: State) -> RuleDrive:
+    """A drive before its first step."""
     driven = RuleDrive(
         np.empty(steps, dtype=np.int64), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64)
     )
@@ -134,44 +156,62 @@ def _at_rest(steps: int, start: State) -> RuleDrive:
 
 
 @compiled()
-def neutral_drive(
+def enough(
     rule: Rule,
     engine: Indices,
+    hint: int,
     choices: Choices,
-    start: State,
-    end_j: float,
+    span: Span,
     battery: BatteryArrays,
-) -> tuple[RuleDrive, Indices, tuple[int, int]]:
-    """The drive whose charging power ends with end_j or just more, the engine's entries in it, (time,), and of
-    which level they are before which step; from there on of the one below.
+    driven: RuleDrive,
+) -> int:
+    """The lowest charging power, (level,), that ends with enough charge; as many as there are where none does.
 
-    engine: (level, time) entries by rising charging power. The lowest level that reaches the charge is kept up to
-    the first step that will do, the one below it from there on; where none reaches it, the highest is kept.
-    Both are found by halving, as more charging leaves more charge.
+    engine: (level, time) entries by rising charging power. More charging leaves more charge, so that levels further
+    and further from a hint are tried until one is enough and one is not, then those half-way between.
     """
-    steps, top = len(choices.step_s), len(engine) - 1
-    driven = _at_rest(steps, start)
-    if _drive(rule, engine[0], 0, choices, battery, driven) - end_j >= 0.0:
-        return driven, engine[0], (0, steps)
-    if _drive(rule, engine[top], 0, choices, battery, driven) - end_j < 0.0:
-        return driven, engine[top], (top, steps)
-    below, level = 0, top
-    while level - below > 1:
-        middle = (below + level) // 2
-        if _drive(rule, engine[middle], 0, choices, battery, driven) - end_j >= 0.0:
-            level = middle
+    low, high, step, level = -1, len(engine), 1, min(hint, len(engine) - 1)
+    while high - low > 1:
+        if drive_on(rule, engine[level], 0, choices, battery, driven) >= span.end_j:
+            high = level
         else:
-            below = middle
-    _drive(rule, engine[level], 0, choices, battery, driven)
-    tried, short, until = _at_rest(steps, start), 0, steps
+            low = level
+        if low < 0:
+            level = max(high - step, 0)
+        elif high == len(engine):
+            level = min(low + step, high - 1)
+        else:
+            level = (low + high) // 2
+        step *= 2
+    return high
+
+
+@compiled()
+def neutral_drive(
+    rule: Rule, engine: Indices, hint: int, choices: Choices, span: Span, battery: BatteryArrays
+) -> tuple[RuleDrive, Indices, tuple[int, int]]:
+    """The drive whose charging power ends with enough charge or just more, the engine's entries in it, (time,), and
+    of which level they are before which step; from there on of the one below.
+
+    The lowest level that reaches the charge is kept up to the first step that will do, found by halving, the one
+    below it from there on; where none reaches it, the highest is kept.
+    """
+    steps = len(choices.step_s)
+    driven, tried = at_rest(steps, span.start), at_rest(steps, span.start)
+    level = enough(rule, engine, hint, choices, span, battery, driven)
+    kept = min(level, len(engine) - 1)
+    drive_on(rule, engine[kept], 0, choices, battery, driven)
+    if level == 0 or level == len(engine):
+        return driven, engine[kept], (kept, steps)
+    short, until = 0, steps
     while until - short > 1:
         # Up to the step the drive is known.
         middle = (short + until) // 2
         tried.energy_j[middle], tried.mode[middle] = driven.energy_j[middle], driven.mode[middle]
-        if _drive(rule, engine[level - 1], middle, choices, battery, tried) - end_j >= 0.0:
+        if drive_on(rule, engine[level - 1], middle, choices, battery, tried) >= span.end_j:
             until = middle
         else:
             short = middle
-    _drive(rule, engine[level - 1], until, choices, battery, driven)
+    drive_on(rule, engine[level - 1], until, choices, battery, driven)
     taken = np.concatenate((engine[level, :until], engine[level - 1, until:]))
     return driven, taken, (level, until)

@@ -2,16 +2,17 @@
 
     standing   engine off, where it may be; on while a gear is engaged for a launch that the engine will drive
     braking    without fuel where that is possible, recovering the most
-    driving    electrically below a power threshold and above a state of charge; else by the engine, which
-               charges with a given power (load-point shift) at least cost, within a cap on NOx
+    driving    electrically up to a power and a speed and above a state of charge; else by the engine, which
+               charges with a given power or is assisted by it (load-point shift, up and down) at least cost,
+               within a cap on NOx
 
 The charging power is raised level by level until the charge is neutral; the last level and the one below it
 then share the cycle, changing once on the way, so that the end charge comes out close.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,76 +20,83 @@ from hevopt.bounds.prices import one_price_dual
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.battery import energy_j
 from hevopt.problem.choices import Choices, State, choices_of, require_choices
 from hevopt.problem.problem import Plan, Problem
-from hevopt.problem.simulation import total_cost_kg
-from hevopt.problem.switching import switched
+from hevopt.strategies import _family_kernels as family
 from hevopt.strategies import _rule_kernels as kernels
 
-_CHARGE_LEVELS = 41
-# Electric driving stops here: this share of the SOC window above its lower end.
+_CHARGE_LEVELS, _ASSIST_LEVELS = 41, 20
+# Electric driving stops here where nothing says otherwise: this share of the SOC window above its lower end.
 _SOC_LEVEL_SHARE = 0.25
+# What the end charge of a member may be worth, of its cost.
+_ELIGIBLE_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Rules(Shown):
-    """Indices that each rule would take, per step; -1 where a step has none.
+    """What a problem leaves to its rules.
 
-    off, electric, recover: (time,); standing, engaging, braking, power_w: (time,) class and wheel power, engaging
-    being standing with a gear engaged; fired: (entry,) whether the engine burns fuel
-    charge_w: (level,) charging powers of the engine; price_kgpj: what a joule of end charge is worth
+    steps: what all members see; span: start, end and window
+    fired: (entry,) whether the engine burns fuel
+    charge_w: (level,) charging powers of the engine, < 0 where the battery assists
+    price_kgpj: what a joule of end charge is worth
     """
 
     problem: Problem
     choices: Choices
-    off: Indices
-    electric: Indices
-    recover: Indices
-    standing: Flags
-    engaging: Flags
-    braking: Flags
-    power_w: Array
+    steps: family.FamilySteps
+    span: kernels.Span
     fired: Flags
     charge_w: Array
     price_kgpj: float
 
+    @property
+    def electric(self) -> Flags:
+        """(time,) steps of driving that can be driven without fuel."""
+        steps = self.steps
+        possible: Flags = ~steps.standing & ~steps.braking & (steps.electric >= 0)
+        return possible
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Outcome(Shown):
-    """One member of a rule family: its controls, cost, NOx and end charge.
 
-    rule, engine: what it takes, and the engine's entries (time,); control: (time,) controls that were taken
-    threshold_w, level: highest power driven electrically; charging power, and before which step it is that one
-    """
+class Limits(NamedTuple):
+    """Up to where a member drives electrically: above a state of charge, up to a power and a speed."""
 
-    threshold_w: float
-    rule: kernels.Rule
+    soc: float
+    power_w: float
+    speed_mps: float
+
+
+class Tried(NamedTuple):
+    """A member of a rule family: its limits, what of it stands in a calibration, the engine's entries by charging
+    power, (level, time), and its result: cost, NOx, surplus of charge, whether it is inside."""
+
+    limits: Limits
+    settings: Mapping[str, float]
     engine: Indices
-    level: tuple[int, int]
-    control: Indices
-    cost_kg: float
-    nox_kg: float
-    surplus_j: float
-    inside: bool
+    result: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Calibrated(Shown):
     """A stepper of the member that a calibration chose, and its plan, which tells of all members.
 
-    rules: those of the problem that it was calibrated on; settings: of the member
+    rules: those of the problem that it was calibrated on
+    rule, engine: what it takes, and the engine's entries (time,)
+    level: charging power, and before which step it is that one, from there on the one below
     """
 
     rules: Rules
-    settings: Mapping[str, Any]
-    outcome: Outcome
+    member: Tried
+    rule: kernels.Rule
+    engine: Indices
+    level: tuple[int, int]
     plan: Plan
 
     def decide(self, k: int, energy_j: float, mode: int) -> int:
         """Index of the control that the rule takes at step k."""
-        rule, engine = self.outcome.rule, self.outcome.engine
         choices = self.rules.choices
-        entry = kernels.entry_at(rule, engine, k, energy_j, mode, choices)
+        entry = kernels.entry_at(self.rule, self.engine, k, energy_j, mode, choices)
         return int(choices.control[entry])
 
 
@@ -107,143 +115,159 @@ def rules_of(problem: Problem, like: Rules | None = None) -> Rules:
     fuel = table.fuel_kg[step, choices.control]
     on = engine_on[choices.control]
     signals = table.signals
-    standing, braking = signals.speed_mps == 0, signals.wheel_power_w < 0
-    charge_max = float(np.max(-choices.power_w, initial=0.0))
-    return Rules(
-        problem=problem,
-        choices=choices,
+    price_kgpj = one_price_dual(problem)[-1].price_kgpj if like is None else like.price_kgpj
+    standing = signals.speed_mps == 0
+    steps = family.FamilySteps(
         off=_least(choices, choices.power_w, ~on),
         electric=_least(choices, choices.power_w, fuel == 0),
         recover=_least(choices, choices.power_w, fuel == _step_minimum(choices, fuel)[step]),
         standing=standing,
         engaging=standing & (signals.gear > 0),
-        braking=braking,
+        braking=signals.wheel_power_w < 0,
         power_w=signals.wheel_power_w,
+        speed_mps=signals.speed_mps,
+        modes=table.mode[choices.control],
+        nox_kg=table.nox_kg[step, choices.control],
+        price_kgpj=price_kgpj,
+    )
+    start = State(problem.start_mode, problem.start_j)
+    return Rules(
+        problem=problem,
+        choices=choices,
+        steps=steps,
+        span=kernels.Span(start, problem.end_min_j, *problem.battery.granted_window_j),
         # Standing or driving, the engine rule never picks a control without fuel.
         fired=on & (fuel > 0),
-        charge_w=np.linspace(0.0, charge_max, _CHARGE_LEVELS) if like is None else like.charge_w,
-        price_kgpj=(one_price_dual(problem)[-1].price_kgpj if like is None else like.price_kgpj),
+        charge_w=_charging_w(choices) if like is None else like.charge_w,
+        price_kgpj=price_kgpj,
     )
 
 
-def neutral_outcome(rules: Rules, threshold_w: float, engine: Indices) -> Outcome:
-    """The family's member for an electric threshold, its charging power found for neutrality.
+def _charging_w(choices: Choices) -> Array:
+    """(level,) powers from the most that assists to the most that charges, 0 among them."""
+    charge_w, assist_w = (float(np.max(sign * choices.power_w, initial=0.0)) for sign in (-1, 1))
+    assisting = np.linspace(-assist_w, 0.0, _ASSIST_LEVELS, endpoint=False)
+    return np.concatenate([assisting, np.linspace(0.0, charge_w, _CHARGE_LEVELS)])
+
+
+def usual_limits(rules: Rules) -> Limits:
+    """Where the file says nothing: the usual state of charge, any power and speed."""
+    battery, given = rules.problem.battery, rules.problem.thresholds
+    share_soc = battery.soc_min + _SOC_LEVEL_SHARE * (battery.soc_max - battery.soc_min)
+    chosen = share_soc, np.inf, np.inf
+    return Limits(
+        *(usual if own is None else own for usual, own in zip(chosen, given, strict=True))
+    )
+
+
+def figures_of(
+    rules: Rules, limits: Sequence[Limits], engine: Indices, *, quick: bool = False
+) -> Array:
+    """(member, 4) cost, NOx, surplus of charge and whether it is inside, of neutral members of a family.
 
     engine: (level, time) entries by charging power, of `engine_entries`
+    quick: of drives that end with up to a level's charge more than neutral
     """
-    choices, problem, rule = rules.choices, rules.problem, rule_of(rules, threshold_w)
-    driven, burning, level = kernels.neutral_drive(
-        rule, engine, choices, State(problem.start_mode, problem.start_j), problem.end_min_j,
-        problem.battery.arrays,
-    )  # fmt: skip
-    return _outcome(rules, threshold_w, rule, driven, burning, level)
+    rows = np.array([_row(rules, own) for own in limits])
+    kernel = family.screened if quick else family.judged
+    battery = rules.problem.battery.arrays
+    return kernel(rules.steps, rows, engine, rules.choices, rules.span, battery)
 
 
-def rule_of(rules: Rules, threshold_w: float) -> kernels.Rule:
-    """The family's rule for an electric threshold."""
-    driving = ~rules.standing & ~rules.braking
-    electric = driving & (rules.power_w <= threshold_w) & (rules.electric >= 0)
-    launch_on_engine = rules.engaging & ~_next_true(electric, rules.standing)
-    stopped = rules.standing & ~launch_on_engine & (rules.off >= 0)
-    low, high = rules.problem.window_j
-    return kernels.Rule(
-        electric=np.where(electric, rules.electric, -1),
-        fixed=np.where(stopped, rules.off, np.where(rules.braking, rules.recover, -1)),
-        modes=rules.problem.table.mode[rules.choices.control],
-        least_j=low + _SOC_LEVEL_SHARE * (high - low),
-        price_kgpj=rules.price_kgpj,
-    )
+def tried(
+    rules: Rules, limits: Sequence[Limits], engine: Indices, **settings: float
+) -> list[Tried]:
+    """Neutral members of a family with one list of engine's entries; settings: what else the calibration tells."""
+    results = figures_of(rules, limits, engine)
+    return [
+        Tried(own, {**told(own), **settings}, engine, result)
+        for own, result in zip(limits, results, strict=True)
+    ]
 
 
-def is_eligible(rules: Rules, outcome: Outcome, share: float = 0.01) -> bool:
-    """Whether the window is kept and the end charge is worth at most a share of the cost.
+def told(limits: Limits) -> dict[str, float]:
+    """What a calibration tells of limits."""
+    return {
+        "threshold_w": float(limits.power_w),
+        "threshold_mps": float(limits.speed_mps),
+        "threshold_soc": float(limits.soc),
+    }
+
+
+def eligible(rules: Rules, results: Array) -> Flags:
+    """(member,) whether the window is kept and the end charge is worth at most a share of the cost.
 
     Stricter than what rows call neutral, energy of that share: a joule of charge is worth more than one of fuel.
     """
-    worth_kg = abs(outcome.surplus_j) * rules.price_kgpj
-    return outcome.inside and worth_kg <= share * outcome.cost_kg
+    cost_kg, _, surplus_j, inside = results.T
+    worth_kg = np.abs(surplus_j) * rules.price_kgpj
+    kept: Flags = (inside > 0) & (worth_kg <= _ELIGIBLE_SHARE * cost_kg)
+    return kept
+
+
+def corrected_kg(rules: Rules, results: Array) -> Array:
+    """(member,) cost less what the charge beyond the asked one is worth."""
+    kg: Array = results[:, 0] - rules.price_kgpj * results[:, 2]
+    return kg
 
 
 def calibrated(
-    rules: Rules,
-    members: list[tuple[dict[str, Any], Outcome]],
-    figure: Callable[[Mapping[str, Any]], float],
+    rules: Rules, members: Sequence[Tried], figure: Callable[[Mapping[str, Any]], Any]
 ) -> Calibrated:
     """The eligible member of least figure; the whole family is its calibration, for the curve."""
+    results = np.array([member.result for member in members])
+    able, corrected = eligible(rules, results), corrected_kg(rules, results)
     calibration = [
         {
-            **settings,
-            "cost_kg": outcome.cost_kg,
-            "corrected_kg": outcome.cost_kg - rules.price_kgpj * outcome.surplus_j,
-            "nox_kg": outcome.nox_kg,
-            "surplus_j": outcome.surplus_j,
-            "inside": outcome.inside,
-            "eligible": is_eligible(rules, outcome),
+            **member.settings,
+            "cost_kg": float(member.result[0]),
+            "corrected_kg": float(corrected[n]),
+            "nox_kg": float(member.result[1]),
+            "surplus_j": float(member.result[2]),
+            "inside": bool(member.result[3] > 0),
+            "eligible": bool(able[n]),
         }
-        for settings, outcome in members
+        for n, member in enumerate(members)
     ]
-    inside = [n for n, (_, outcome) in enumerate(members) if outcome.inside]
+    inside = [n for n, member in enumerate(calibration) if member["inside"]]
     if not inside:
         raise InfeasibleError(
             "no member of the rule family keeps the SOC window; widen it or use dp or ecms"
         )
-    eligible = [n for n in inside if calibration[n]["eligible"]] or inside
-    chosen = min(eligible, key=lambda n: figure(calibration[n]))
-    told, outcome = members[chosen]
+    fit = [n for n in inside if able[n]] or inside
+    chosen = min(fit, key=lambda n: figure(calibration[n]))
+    member, battery = members[chosen], rules.problem.battery.arrays
+    rule, middle = rule_for(rules, member.limits), len(member.engine) // 2
+    driven, engine, level = kernels.neutral_drive(
+        rule, member.engine, middle, rules.choices, rules.span, battery
+    )
     notes = {"calibration": calibration, "chosen": chosen}
-    return Calibrated(rules, told, outcome, Plan(outcome.control, notes))
+    plan = Plan(rules.choices.control[driven.entry], notes)
+    return Calibrated(rules, member, rule, engine, level, plan)
+
+
+def rule_for(rules: Rules, limits: Limits) -> kernels.Rule:
+    """The rule of a member with some limits."""
+    rule: kernels.Rule = family.rule_of(rules.steps, _row(rules, limits))
+    return rule
+
+
+def _row(rules: Rules, limits: Limits) -> Array:
+    """Limits with the stored energy in place of the state of charge."""
+    battery = rules.problem.battery
+    soc = np.clip(limits.soc, battery.soc_min, battery.soc_max)
+    return np.array([float(energy_j(battery, soc)), limits.power_w, limits.speed_mps])
 
 
 def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
     """(level, time) entries that the engine drives with under a cap on NOx, by charging power."""
-    choices = rules.choices
-    steps = choices.spread(np.arange(choices.steps))
-    nox = rules.problem.table.nox_kg[steps, choices.control]
+    steps, choices = rules.steps, rules.choices
     shifted = kernels.load_point_choices(
-        choices, nox, rules.fired, rules.charge_w, float(nox_cap_kgps)
+        choices, steps.nox_kg, rules.fired, rules.charge_w, float(nox_cap_kgps)
     )
-    shifted = np.where(shifted >= 0, shifted, rules.recover)
+    shifted = np.where(shifted >= 0, shifted, steps.recover)
     # Load-point shift is for driving; standing, the engine covers the electric load and no more.
-    return np.where(rules.standing, shifted[0], shifted)
-
-
-def _outcome(
-    rules: Rules,
-    threshold_w: float,
-    rule: kernels.Rule,
-    driven: kernels.RuleDrive,
-    engine: Indices,
-    level: tuple[int, int],
-) -> Outcome:
-    """What a drive under a rule with the engine's entries, (time,), comes to."""
-    problem, choices = rules.problem, rules.choices
-    control, energy_j = choices.control[driven.entry], driven.energy_j
-    steps = np.arange(choices.steps)
-    switch = switched(problem.table, problem.start_mode, control)
-    stored = np.concatenate([energy_j, energy_j[:-1] - switch.energy_j])
-    least_j, greatest_j = problem.battery.granted_window_j
-    return Outcome(
-        threshold_w,
-        rule,
-        engine,
-        level,
-        control,
-        total_cost_kg(problem, control)[0],
-        float(np.sum(problem.table.nox_kg[steps, control])),
-        float(energy_j[-1]) - problem.end_min_j,
-        bool((stored >= least_j).all() and (stored <= greatest_j).all())
-        and bool(switch.allowed.all()),
-    )
-
-
-def _next_true(flags: Flags, standing: Flags) -> Flags:
-    """(time,) the flag of the first moving step at or after each step."""
-    moving = np.flatnonzero(~standing)
-    following = np.searchsorted(moving, np.arange(len(flags)))
-    inside = following < len(moving)
-    result = np.zeros(len(flags), dtype=bool)
-    result[inside] = flags[moving[following[inside]]]
-    return result
+    return np.where(steps.standing, shifted[_ASSIST_LEVELS], shifted)
 
 
 def _least(choices: Choices, figure: Array, allowed: Flags) -> Indices:

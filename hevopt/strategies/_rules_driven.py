@@ -5,26 +5,26 @@ import numpy as np
 from hevopt.problem.arrays import Indices
 from hevopt.problem.problem import Problem
 from hevopt.strategies import _rule_kernels as kernels
-from hevopt.strategies._rules import Calibrated, Rules, engine_entries, rule_of, rules_of
+from hevopt.strategies._rules import Calibrated, Rules, engine_entries, rule_for, rules_of
 
 
 class DrivenRule:
-    """The rule's electric threshold, cap on NOx and charging power on operating points.
+    """The rule's electric thresholds, cap on NOx and charging power on operating points.
 
     The charging power falls by one level at the time at which it did in the calibration.
     """
 
     def __init__(self, of: Calibrated, points: Problem, interval_s: float) -> None:
         rules = rules_of(points, of.rules)
-        level, until = of.outcome.level
+        level, until = of.level
         ends_s = np.append(0.0, np.cumsum(of.rules.problem.table.step_s))
-        self.rules, self.rule = rules, rule_of(rules, of.outcome.threshold_w)
+        self.rules, self.rule = rules, rule_for(rules, of.member.limits)
         self.engine = self._entries(rules, of, level), self._entries(rules, of, max(level - 1, 0))
         self.until_s, self.interval_s, self.asked = float(ends_s[until]), interval_s, 0
 
     @staticmethod
     def _entries(rules: Rules, of: Calibrated, level: int) -> Indices:
-        cap = float(of.settings.get("nox_cap_kgps", np.inf))
+        cap = float(of.member.settings.get("nox_cap_kgps", np.inf))
         entries: Indices = engine_entries(rules, cap)[level]
         return entries
 

@@ -1,40 +1,65 @@
 """The rule-based fuel strategy of the study.
 
-Above a state of charge the car is driven electrically until a power threshold; it recovers what braking gives;
-otherwise the engine runs and shifts its load point to keep the charge neutral; it rests at standstill. The
-threshold is calibrated: of the whole family, the member of least charge-corrected cost.
+Above a state of charge the car is driven electrically up to a power and a speed; it recovers what braking gives;
+otherwise the engine runs and shifts its load point, up or down, to keep the charge neutral; it rests at standstill.
+The three thresholds stand in the car's file (`[rules]`); those that do not are calibrated together: of the whole
+family, the member of least charge-corrected cost. A grid over all three is screened; from its best member on, each
+threshold in turn goes through all its values, the others kept, until none gives less.
 """
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
+from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._rules import (
     Calibrated,
+    Limits,
+    Rules,
     calibrated,
+    corrected_kg,
+    eligible,
     engine_entries,
-    neutral_outcome,
+    figures_of,
     rules_of,
+    told,
+    tried,
 )
 from hevopt.strategies._rules_driven import DrivenRule
 
-_THRESHOLDS = 24
+# Values of each threshold; of the window's width above its lower end, those of the state of charge.
+_POWERS, _SPEEDS = 24, 12
+_SOC_SHARES = np.linspace(0.05, 0.5, 10)
+_ROUNDS = 8
 
 
-def start(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Calibrated:
+def start(
+    problem: Problem,
+    *,
+    thresholds_w: Sequence[float] | None = None,
+    thresholds_mps: Sequence[float] | None = None,
+    thresholds_soc: Sequence[float] | None = None,
+) -> Calibrated:
     """The family's member that suits the problem best; see `solve`."""
     rules = rules_of(problem)
-    if thresholds_w is None:
-        electric = ~rules.standing & ~rules.braking & (rules.electric >= 0)
-        top_w = float(np.max(rules.power_w[electric], initial=0.0))
-        thresholds_w = np.linspace(0.0, top_w, _THRESHOLDS).tolist()
     engine = engine_entries(rules)
-    members = [
-        ({"threshold_w": threshold}, neutral_outcome(rules, threshold, engine))
-        for threshold in thresholds_w
+    asked = thresholds_soc, thresholds_w, thresholds_mps
+    axes = [
+        np.asarray(usual if own is None else own, dtype=np.float64)
+        for own, usual in zip(asked, _axes(rules), strict=True)
     ]
-    return calibrated(rules, members, lambda member: member["corrected_kg"])
+    coarse = [np.unique(np.append(axis[::4], axis[-1])) for axis in axes]
+    near = [Limits(*limits) for limits in product(*coarse)]
+    centre = near[int(np.argmin(_ranked(rules, figures_of(rules, near, engine, quick=True))))]
+    centre = _improved(rules, axes, centre, engine, quick=True)
+    centre = _improved(rules, axes, centre, engine, quick=False)
+    members = tried(rules, _sections(axes, centre), engine)
+    own = told(centre).items()
+    return calibrated(
+        rules, members, lambda member: (member["corrected_kg"], not own <= member.items())
+    )
 
 
 def start_on(problem: Problem, points: Problem, interval_s: float) -> DrivenRule:
@@ -42,9 +67,68 @@ def start_on(problem: Problem, points: Problem, interval_s: float) -> DrivenRule
     return DrivenRule(start(problem), points, interval_s)
 
 
-def solve(problem: Problem, *, thresholds_w: Sequence[float] | None = None) -> Plan:
-    """The family's best member; notes["calibration"] holds the curve over the threshold.
+def solve(
+    problem: Problem,
+    *,
+    thresholds_w: Sequence[float] | None = None,
+    thresholds_mps: Sequence[float] | None = None,
+    thresholds_soc: Sequence[float] | None = None,
+) -> Plan:
+    """The family's best member; notes["calibration"] holds the curve over each threshold, the others kept.
 
-    thresholds_w: members to choose from, by default evenly up to the highest power driven electrically
+    thresholds_*: values to choose from in place of the usual ones, evenly up to the highest power and speed driven
+    electrically, and from near the lower end of the window to its middle
     """
-    return start(problem, thresholds_w=thresholds_w).plan
+    return start(
+        problem,
+        thresholds_w=thresholds_w,
+        thresholds_mps=thresholds_mps,
+        thresholds_soc=thresholds_soc,
+    ).plan
+
+
+def _axes(rules: Rules) -> list[Array]:
+    """Values of each threshold, rising: those of the file where it gives them."""
+    steps, given, battery = rules.steps, rules.problem.thresholds, rules.problem.battery
+    width = battery.soc_max - battery.soc_min
+    top_w, top_mps = (
+        float(np.max(of[rules.electric], initial=0.0)) for of in (steps.power_w, steps.speed_mps)
+    )
+    usual = [
+        battery.soc_min + _SOC_SHARES * width,
+        np.linspace(0.0, top_w, _POWERS),
+        np.linspace(0.0, top_mps, _SPEEDS + 1)[1:],
+    ]
+    return [
+        axis if own is None else np.array([own]) for axis, own in zip(usual, given, strict=True)
+    ]
+
+
+def _improved(
+    rules: Rules, axes: Sequence[Array], centre: Limits, engine: Indices, *, quick: bool
+) -> Limits:
+    """A member that none on the lines through it is better than, found from another on."""
+    for _ in range(_ROUNDS):
+        limits = _sections(axes, centre)
+        ranks = _ranked(rules, figures_of(rules, limits, engine, quick=quick))
+        best = int(np.argmin(ranks))
+        if ranks[best] >= ranks[limits.index(centre)]:
+            break
+        centre = limits[best]
+    return centre
+
+
+def _ranked(rules: Rules, results: Array) -> Array:
+    """(member,) corrected cost; beyond all others where the end charge is off, and where it is not inside."""
+    corrected, inside = corrected_kg(rules, results), results[:, 3] > 0
+    beyond = 1.0 + np.ptp(corrected)
+    ranks: Array = corrected + beyond * ~eligible(rules, results) + beyond * ~inside
+    return ranks
+
+
+def _sections(axes: Sequence[Array], centre: Limits) -> list[Limits]:
+    """The members on lines through one, a line along each axis; on the first line it stands itself."""
+    power = [centre._replace(power_w=float(value)) for value in np.union1d(axes[1], centre.power_w)]
+    speed = [centre._replace(speed_mps=float(value)) for value in axes[2]]
+    soc = [centre._replace(soc=float(value)) for value in axes[0]]
+    return [*power, *(limits for limits in (*speed, *soc) if limits != centre)]

@@ -12,8 +12,9 @@ from hevopt.strategies._rules import (
     Calibrated,
     calibrated,
     engine_entries,
-    neutral_outcome,
     rules_of,
+    tried,
+    usual_limits,
 )
 from hevopt.strategies._rules_driven import DrivenRule
 
@@ -25,20 +26,17 @@ _ELECTRIC_SHARE_MAX = 0.3
 def start(problem: Problem) -> Calibrated:
     """The family's member that suits the problem best; see `solve`."""
     rules = rules_of(problem)
-    driving = ~rules.standing & ~rules.braking
-    top_w = float(np.max(rules.power_w[driving & (rules.electric >= 0)], initial=0.0))
+    driving = ~rules.steps.standing & ~rules.steps.braking
+    top_w = float(np.max(rules.steps.power_w[rules.electric], initial=0.0))
     nox_kgps = problem.table.nox_kg / problem.table.step_s[:, None]
     peak = float(np.max(nox_kgps[driving], initial=0.0))
-    engines = {
-        cap: engine_entries(rules, cap) for cap in (peak * np.geomspace(0.03, 1.0, _CAPS)).tolist()
-    }
+    given_w, usual = problem.thresholds.electric_power_w, usual_limits(rules)
+    powers = np.linspace(0.0, _ELECTRIC_SHARE_MAX * top_w, _THRESHOLDS).tolist()
+    limits = [usual._replace(power_w=power) for power in powers] if given_w is None else [usual]
     members = [
-        (
-            {"threshold_w": threshold, "nox_cap_kgps": cap},
-            neutral_outcome(rules, threshold, engine),
-        )
-        for threshold in np.linspace(0.0, _ELECTRIC_SHARE_MAX * top_w, _THRESHOLDS).tolist()
-        for cap, engine in engines.items()
+        member
+        for cap in (peak * np.geomspace(0.03, 1.0, _CAPS)).tolist()
+        for member in tried(rules, limits, engine_entries(rules, cap), nox_cap_kgps=cap)
     ]
     return calibrated(rules, members, lambda member: member["nox_kg"])
 

@@ -8,8 +8,9 @@ from hevopt.strategies._rules import (
     Calibrated,
     calibrated,
     engine_entries,
-    neutral_outcome,
     rules_of,
+    tried,
+    usual_limits,
 )
 
 _NEVER_ELECTRIC_W = -1.0
@@ -18,8 +19,9 @@ _NEVER_ELECTRIC_W = -1.0
 def start(problem: Problem) -> Calibrated:
     """The rule with the charging power that keeps the charge; see `solve`."""
     rules = rules_of(problem)
-    outcome = neutral_outcome(rules, _NEVER_ELECTRIC_W, engine_entries(rules))
-    return calibrated(rules, [({}, outcome)], lambda member: member["corrected_kg"])
+    never = usual_limits(rules)._replace(power_w=_NEVER_ELECTRIC_W)
+    members = tried(rules, [never], engine_entries(rules))
+    return calibrated(rules, members, lambda member: member["corrected_kg"])
 
 
 def solve(problem: Problem) -> Plan:

@@ -1,6 +1,7 @@
 """From solved cases to Results: give `Collector.observe` to `study.compare`, then ask for the results."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +210,8 @@ def _calibration(case: Case, notes: Mapping[str, Any]) -> list[SavedMember]:
     return [
         SavedMember(
             threshold_w=member["threshold_w"],
+            threshold_mps=member["threshold_mps"] if isfinite(member["threshold_mps"]) else None,
+            threshold_soc=member["threshold_soc"],
             nox_cap_kgps=member.get("nox_cap_kgps"),
             corrected_l_per_100km=litres(case.car, case.cycle, member["corrected_kg"]),
             nox_mg_per_km=member["nox_kg"] * 1e9 / distance_m if engine.nox_known else None,

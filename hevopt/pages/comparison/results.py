@@ -100,10 +100,14 @@ class Share(FileModel):
 class SavedMember(FileModel):
     """One member of a rule family: thresholds, and what comes of them; NOx None where it is not known.
 
+    threshold_mps: None where every speed is driven electrically, and like threshold_soc in older files
+
     neutral: keeps the SOC window, and its end charge is that asked within 1 % of the fuel's energy, as of rows
     """
 
     threshold_w: Number
+    threshold_mps: Number | None = None
+    threshold_soc: Number | None = None
     nox_cap_kgps: Number | None = None
     corrected_l_per_100km: Number
     nox_mg_per_km: Number | None

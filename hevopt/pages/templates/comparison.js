@@ -138,7 +138,11 @@
       figure("spells", own.spells);
     }
     const family = (id, capped, build) => (AllRows.calibrated(capped).length ? figure(id, build) : byId(`figure-${id}`)?.remove());
-    family("calibration-threshold", false, AllRows.thresholds);
+    for (const key of ["threshold_w", "threshold_mps", "threshold_soc"]) {
+      const id = `calibration-${key}`;
+      if (AllRows.hasLine(key)) figure(id, (look, width) => AllRows.thresholds(look, width, key));
+      else byId(`figure-${id}`)?.remove();
+    }
     family("calibration-plane", true, AllRows.plane);
     if (Shown.results.pareto) figure("pareto-front", AllRows.pareto);
     if (byId("effects-of")) {

@@ -142,16 +142,28 @@ const AllRows = (() => {
     return Shown.results.rows.filter((row) => row.detail?.calibration.length && (row.detail.calibration[0].nox_cap_kgps !== null) === capped);
   }
 
-  function thresholds(look, width) {
-    const data = [], x = (m) => m.threshold_w / 1e3, y = (m) => m.corrected_l_per_100km;
+  // The lines of a calibration through the member taken: over each threshold, the others kept.
+  const LINES = {
+    threshold_w: { factor: 1e-3, digits: ".2f", unit: " kW", title: "electric below (kW at the wheels)" },
+    threshold_mps: { factor: 3.6, digits: ".0f", unit: " km/h", title: "electric below (km/h)" },
+    threshold_soc: { factor: 1, digits: ".3f", unit: "", title: "electric above (state of charge)" },
+  };
+  const hasLine = (key) => calibrated(false).some((row) => row.detail.calibration[0][key] !== null);
+  function lineOver(row, key) {
+    const members = row.detail.calibration, taken = members.find((m) => m.chosen), others = Object.keys(LINES).filter((other) => other !== key);
+    return members.filter((m) => m[key] !== null && others.every((other) => m[other] === taken[other])).sort((a, b) => a[key] - b[key]);
+  }
+
+  function thresholds(look, width, key) {
+    const data = [], { factor, digits, unit, title } = LINES[key], x = (m) => m[key] * factor, y = (m) => m.corrected_l_per_100km;
     for (const row of calibrated(false)) {
-      const n = carNames().indexOf(row.figures.architecture), line = lineOf(look, n), members = row.detail.calibration;
+      const n = carNames().indexOf(row.figures.architecture), line = lineOf(look, n), members = lineOver(row, key);
       data.push({ type: "scatter", mode: "lines+markers", name: plain(shortNameOf(row)), x: members.map(x), y: members.map(y), line,
         marker: { symbol: members.map((m) => SYMBOLS[n % SYMBOLS.length] + (m.neutral ? "" : "-open")), size: 6, color: line.color },
-        customdata: members.map((m) => [m.nox_mg_per_km === null ? "unknown" : `${fixed(m.nox_mg_per_km, 0)} mg/km`, m.surplus_j / 1e3]), hovertemplate: `${plain(nameOf(row))}<br>%{x:.2f} kW: %{y:.3f} l/100 km<br>NO<sub>x</sub> %{customdata[0]}, end surplus %{customdata[1]:+.1f} kJ<extra></extra>` });
+        customdata: members.map((m) => [m.nox_mg_per_km === null ? "unknown" : `${fixed(m.nox_mg_per_km, 0)} mg/km`, m.surplus_j / 1e3]), hovertemplate: `${plain(nameOf(row))}<br>%{x:${digits}}${unit}: %{y:.3f} l/100 km<br>NO<sub>x</sub> %{customdata[0]}, end surplus %{customdata[1]:+.1f} kJ<extra></extra>` });
       data.push(ring(look, members.filter((m) => m.chosen), x, y));
     }
-    return { data, layout: layout(look, width, { xaxis: axis(look, "electric below (kW at the wheels)", { rangemode: "tozero" }), yaxis: axis(look, `${Shown.results.nox_weight ? "objective" : "fuel"}, corrected (l/100 km)`) }) };
+    return { data, layout: layout(look, width, { xaxis: axis(look, title, key === "threshold_soc" ? {} : { rangemode: "tozero" }), yaxis: axis(look, `${Shown.results.nox_weight ? "objective" : "fuel"}, corrected (l/100 km)`) }) };
   }
 
   function plane(look, width) {

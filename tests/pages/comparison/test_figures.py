@@ -161,7 +161,8 @@ def test_long_names_are_short_in_axes_and_legends_and_whole_where_the_mouse_rest
     )
     assert "a car of the … dp" in texts and len(texts) == 20
     drawn = page.evaluate(
-        "['calibration-threshold', 'calibration-plane'].flatMap(id => document.getElementById(id).data"
+        "['threshold_w', 'threshold_mps', 'threshold_soc', 'plane'].flatMap("
+        "id => document.getElementById(`calibration-${id}`).data"
         ".filter(t => t.name?.startsWith('a car')).map(t => [t.name, t.hovertemplate]))"
     )
     assert drawn and all(len(label) < 30 and name in hover for label, hover in drawn)

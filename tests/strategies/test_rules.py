@@ -1,0 +1,119 @@
+"""The rules: thresholds calibrated together or given by the file, load shifted up and down."""
+
+import numpy as np
+import pytest
+
+from hevopt import build_problem, load_architecture, load_cycle, simulate
+from hevopt.errors import DataError
+from hevopt.strategies import _family_kernels as family
+from hevopt.strategies import _rule_kernels as kernels
+from hevopt.strategies import conventional
+from hevopt.strategies._rules import Limits, engine_entries, figures_of, rules_of
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return build_problem(load_architecture("C2"), load_cycle("nedc"), levels=9)
+
+
+@pytest.fixture(scope="module")
+def plan(problem):
+    return conventional.solve(problem)
+
+
+def taken(plan):
+    return plan.notes["calibration"][plan.notes["chosen"]]
+
+
+def test_it_drives_electrically_within_all_three_thresholds_and_nowhere_else(problem, plan):
+    run, member, signals = simulate(problem, plan.control), taken(plan), problem.table.signals
+    on = np.array([problem.table.controls[c].engine_on for c in run.control])
+    driving = (signals.speed_mps > 0) & (signals.wheel_power_w >= 0)
+    within = (
+        (signals.wheel_power_w <= member["threshold_w"])
+        & (signals.speed_mps <= member["threshold_mps"])
+        & (run.soc[:-1] > member["threshold_soc"])
+    )
+    possible = ((problem.table.fuel_kg == 0) & problem.table.feasible).any(axis=1)
+    assert np.array_equal(~on[driving], (within & possible)[driving])
+    assert 50 < np.sum(driving & ~on) < np.sum(driving) - 50
+
+
+def test_a_calibration_tells_of_its_plan(problem, plan):
+    run, member = simulate(problem, plan.control), taken(plan)
+    assert member["cost_kg"] == pytest.approx(run.cost_kg, rel=1e-12)
+    assert member["nox_kg"] == pytest.approx(run.total_nox_kg, rel=1e-12)
+    assert member["surplus_j"] == pytest.approx(run.end_j - problem.end_min_j, abs=1e-3)
+    assert member["inside"] and member["eligible"] and member["surplus_j"] >= 0
+
+
+def test_no_member_on_a_line_through_the_one_taken_burns_less(plan):
+    best = taken(plan)
+    keys = "threshold_w", "threshold_mps", "threshold_soc"
+    for member in plan.notes["calibration"]:
+        assert sum(member[key] != best[key] for key in keys) <= 1
+        assert member["corrected_kg"] >= best["corrected_kg"] or not member["eligible"]
+    for key in keys:
+        assert len({member[key] for member in plan.notes["calibration"]}) > 9
+
+
+def test_three_thresholds_burn_less_than_one(problem, plan):
+    one = conventional.solve(problem, thresholds_mps=[np.inf], thresholds_soc=[0.5])
+    assert taken(plan)["corrected_kg"] < 0.99 * taken(one)["corrected_kg"]
+
+
+def test_load_is_shifted_down_where_braking_gives_more_than_electric_driving_uses(problem):
+    never = conventional.solve(problem, thresholds_w=[0.0])
+    run = simulate(problem, never.control)
+    assert taken(never)["eligible"]
+    driving = problem.table.signals.wheel_power_w > 0
+    assert np.sum(run.battery_power_w[driving & (run.fuel_kg > 0)] > 300.0) > 50
+
+
+def test_thresholds_of_the_file_are_kept(problem):
+    given = {
+        "rules.electric_power_w": 3000,
+        "rules.electric_speed_kmh": 45,
+        "rules.electric_soc": 0.5,
+    }
+    car = load_architecture("C2", given)
+    asked = build_problem(car, load_cycle("nedc"), levels=9)
+    (member,) = conventional.solve(asked).notes["calibration"]
+    assert (member["threshold_w"], member["threshold_soc"]) == (3000, 0.5)
+    assert member["threshold_mps"] == pytest.approx(12.5)
+    again = conventional.solve(
+        problem, thresholds_w=[3000], thresholds_mps=[12.5], thresholds_soc=[0.5]
+    )
+    assert taken(again)["cost_kg"] == member["cost_kg"]
+
+
+def test_a_charge_outside_the_window_is_a_message():
+    car = load_architecture("C2", {"rules.electric_soc": 0.9})
+    with pytest.raises(
+        DataError, match=r"electric_soc 0.9 lies outside the SOC window; allowed: 0.4"
+    ):
+        build_problem(car, load_cycle("nedc"), levels=3)
+
+
+def test_a_level_found_from_any_hint_is_the_lowest_that_is_enough(problem):
+    rules = rules_of(problem)
+    engine = engine_entries(rules)
+    row = np.array([problem.window_j[0], 4000.0, 20.0])
+    rule, battery = family.rule_of(rules.steps, row), problem.battery.arrays
+    driven = kernels.at_rest(rules.choices.steps, rules.span.start)
+    ends = [
+        kernels.drive_on(rule, entries, 0, rules.choices, battery, driven) for entries in engine
+    ]
+    lowest = next(n for n, end in enumerate(ends) if end >= problem.end_min_j)
+    assert 0 < lowest < len(ends) - 1
+    for hint in (0, lowest - 1, lowest, lowest + 7, len(ends)):
+        found = kernels.enough(rule, engine, hint, rules.choices, rules.span, battery, driven)
+        assert found == lowest
+
+
+def test_members_do_not_depend_on_who_is_judged_before_them(problem):
+    rules = rules_of(problem)
+    engine = engine_entries(rules)
+    limits = [Limits(0.42, 5000.0, 20.0), Limits(0.5, 0.0, 30.0), Limits(0.45, 9000.0, 12.0)]
+    forth, back = (figures_of(rules, some, engine) for some in (limits, limits[::-1]))
+    assert np.array_equal(forth, back[::-1])
