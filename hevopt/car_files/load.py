@@ -58,8 +58,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         found = component_contents(path, key, getattr(data, key), of_parts[key])
         contents[key] = found.contents
         files.append(found.file)
-        file = checked(found.place, found.contents, model)
-        files_of[key] = file
+        files_of[key] = file = checked(found.place, found.contents, model)
         return _built(found.place, build, file)
 
     pack = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))

@@ -59,7 +59,7 @@ class Rules(Shown):
         return possible
 
 
-class Limits(NamedTuple):
+class ElectricLimits(NamedTuple):
     """Up to where a member drives electrically: above a state of charge, up to a power and a speed."""
 
     soc: float
@@ -71,7 +71,7 @@ class Tried(NamedTuple):
     """A member of a rule family: its limits, what of it stands in a calibration, the engine's entries by charging
     power, (level, time), and its result: cost, NOx, surplus of charge, whether it is inside."""
 
-    limits: Limits
+    limits: ElectricLimits
     settings: Mapping[str, float]
     engine: Indices
     result: Array
@@ -150,18 +150,18 @@ def _charging_w(choices: Choices) -> Array:
     return np.concatenate([assisting, np.linspace(0.0, charge_w, _CHARGE_LEVELS)])
 
 
-def usual_limits(rules: Rules) -> Limits:
+def usual_limits(rules: Rules) -> ElectricLimits:
     """Where the file says nothing: the usual state of charge, any power and speed."""
     battery, given = rules.problem.battery, rules.problem.thresholds
     share_soc = battery.soc_min + _SOC_LEVEL_SHARE * (battery.soc_max - battery.soc_min)
     chosen = share_soc, np.inf, np.inf
-    return Limits(
+    return ElectricLimits(
         *(usual if own is None else own for usual, own in zip(chosen, given, strict=True))
     )
 
 
 def figures_of(
-    rules: Rules, limits: Sequence[Limits], engine: Indices, *, quick: bool = False
+    rules: Rules, limits: Sequence[ElectricLimits], engine: Indices, *, quick: bool = False
 ) -> Array:
     """(member, 4) cost, NOx, surplus of charge and whether it is inside, of neutral members of a family.
 
@@ -175,7 +175,7 @@ def figures_of(
 
 
 def tried(
-    rules: Rules, limits: Sequence[Limits], engine: Indices, **settings: float
+    rules: Rules, limits: Sequence[ElectricLimits], engine: Indices, **settings: float
 ) -> list[Tried]:
     """Neutral members of a family with one list of engine's entries; settings: what else the calibration tells."""
     results = figures_of(rules, limits, engine)
@@ -185,7 +185,7 @@ def tried(
     ]
 
 
-def told(limits: Limits) -> dict[str, float]:
+def told(limits: ElectricLimits) -> dict[str, float]:
     """What a calibration tells of limits."""
     return {
         "threshold_w": float(limits.power_w),
@@ -246,14 +246,14 @@ def calibrated(
     return Calibrated(rules, member, rule, engine, level, plan)
 
 
-def rule_for(rules: Rules, limits: Limits) -> kernels.Rule:
+def rule_for(rules: Rules, limits: ElectricLimits) -> kernels.Rule:
     """The rule of a member with some limits."""
     rule: kernels.Rule = family.rule_of(rules.steps, _row(rules, limits))
     return rule
 
 
-def _row(rules: Rules, limits: Limits) -> Array:
-    """Limits with the stored energy in place of the state of charge."""
+def _row(rules: Rules, limits: ElectricLimits) -> Array:
+    """ElectricLimits with the stored energy in place of the state of charge."""
     battery = rules.problem.battery
     soc = np.clip(limits.soc, battery.soc_min, battery.soc_max)
     return np.array([float(energy_j(battery, soc)), limits.power_w, limits.speed_mps])

@@ -16,7 +16,7 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._rules import (
     Calibrated,
-    Limits,
+    ElectricLimits,
     Rules,
     calibrated,
     corrected_kg,
@@ -51,7 +51,7 @@ def start(
         for own, usual in zip(asked, _axes(rules), strict=True)
     ]
     coarse = [np.unique(np.append(axis[::4], axis[-1])) for axis in axes]
-    near = [Limits(*limits) for limits in product(*coarse)]
+    near = [ElectricLimits(*limits) for limits in product(*coarse)]
     centre = near[int(np.argmin(_ranked(rules, figures_of(rules, near, engine, quick=True))))]
     centre = _improved(rules, axes, centre, engine, quick=True)
     centre = _improved(rules, axes, centre, engine, quick=False)
@@ -105,8 +105,8 @@ def _axes(rules: Rules) -> list[Array]:
 
 
 def _improved(
-    rules: Rules, axes: Sequence[Array], centre: Limits, engine: Indices, *, quick: bool
-) -> Limits:
+    rules: Rules, axes: Sequence[Array], centre: ElectricLimits, engine: Indices, *, quick: bool
+) -> ElectricLimits:
     """A member that none on the lines through it is better than, found from another on."""
     for _ in range(_ROUNDS):
         limits = _sections(axes, centre)
@@ -126,7 +126,7 @@ def _ranked(rules: Rules, results: Array) -> Array:
     return ranks
 
 
-def _sections(axes: Sequence[Array], centre: Limits) -> list[Limits]:
+def _sections(axes: Sequence[Array], centre: ElectricLimits) -> list[ElectricLimits]:
     """The members on lines through one, a line along each axis; on the first line it stands itself."""
     power = [centre._replace(power_w=float(value)) for value in np.union1d(axes[1], centre.power_w)]
     speed = [centre._replace(speed_mps=float(value)) for value in axes[2]]

@@ -8,7 +8,7 @@ from hevopt.errors import DataError
 from hevopt.strategies import _family_kernels as family
 from hevopt.strategies import _rule_kernels as kernels
 from hevopt.strategies import conventional
-from hevopt.strategies._rules import Limits, engine_entries, figures_of, rules_of
+from hevopt.strategies._rules import ElectricLimits, engine_entries, figures_of, rules_of
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +114,10 @@ def test_a_level_found_from_any_hint_is_the_lowest_that_is_enough(problem):
 def test_members_do_not_depend_on_who_is_judged_before_them(problem):
     rules = rules_of(problem)
     engine = engine_entries(rules)
-    limits = [Limits(0.42, 5000.0, 20.0), Limits(0.5, 0.0, 30.0), Limits(0.45, 9000.0, 12.0)]
+    limits = [
+        ElectricLimits(0.42, 5000.0, 20.0),
+        ElectricLimits(0.5, 0.0, 30.0),
+        ElectricLimits(0.45, 9000.0, 12.0),
+    ]
     forth, back = (figures_of(rules, some, engine) for some in (limits, limits[::-1]))
     assert np.array_equal(forth, back[::-1])
