@@ -224,5 +224,5 @@ const AllRows = (() => {
     }) };
   }
 
-  return { change, shares, calibrated, thresholds, plane, pareto, sensitivity };
+  return { change, shares, calibrated, hasLine, thresholds, plane, pareto, sensitivity };
 })();
