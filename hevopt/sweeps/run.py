@@ -60,12 +60,17 @@ class Schedule:
 
     def picked(self, keys: Iterable[str]) -> Iterator[Job]:
         """Jobs for some of the cases, each of which is run once though several jobs have it."""
-        wanted = set(keys)
-        for job in self.jobs:
-            cases = tuple(case for case in job.cases if case.key in wanted)
-            wanted.difference_update(case.key for case in cases)
-            if cases:
-                yield replace(job, cases=cases)
+        return picked(self.jobs, keys)
+
+
+def picked(jobs: Iterable[Job], keys: Iterable[str]) -> Iterator[Job]:
+    """Jobs for some of their cases, each of which is run once though several jobs have it."""
+    wanted = set(keys)
+    for job in jobs:
+        cases = tuple(case for case in job.cases if case.key in wanted)
+        wanted.difference_update(case.key for case in cases)
+        if cases:
+            yield replace(job, cases=cases)
 
 
 @dataclass(slots=True)
@@ -132,18 +137,22 @@ def plan_of(
 
 def begin(plan: Schedule, store: Store, command: str) -> None:
     """Make a plan the store's."""
-    study = plan.study
+    meta = meta_of(plan.study, plan.inputs, command)
+    store.begin(meta, ((d.number, d.values) for d in plan.designs), plan.planned)
+
+
+def meta_of(study: SweepStudy, inputs: Mapping[str, str], command: str) -> dict[str, str]:
+    """What a store knows of a study. inputs: file -> SHA-256; command: what repeats it"""
     text = study.source.read_text(encoding="utf-8-sig")
-    meta = {
+    return {
         "study": text,
         "study_digest": digest(text),
         "code_digest": code_digest(),
         "versions": json.dumps(versions()),
-        "inputs": dumped_json(dict(plan.inputs)),
+        "inputs": dumped_json(dict(inputs)),
         "command": command,
         "study_file": str(study.source.absolute()),
     }
-    store.begin(meta, ((d.number, d.values) for d in plan.designs), plan.planned)
 
 
 def settled(endings: Mapping[str, str], *, retry_failed: bool) -> set[str]:
@@ -174,32 +183,31 @@ def run_sweep(
         )  # fmt: skip
         # With bounds and incumbents all in the store there may be nothing to start workers for.
         team_when_needed = cache(lambda: stack.enter_context(team))
-        course = _Course(plan, store, team_when_needed, missing, progress, watch)
+        course = Course(store, team_when_needed, progress, watch, missing)
         if prune:
-            _pruned(course)
+            _pruned(plan, course)
         else:
-            course.run(missing)
+            course.run(plan.jobs, missing)
         store.check_place()
     return progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Course:
+class Course:
     """A sweep under way. workers: starts them at the first call; missing: keys of the cases still to run."""
 
-    plan: Schedule
     store: Store
     workers: Callable[[], Run]
-    missing: set[str]
     progress: Advance
     watch: Onlookers
+    missing: set[str] = field(default_factory=set)
 
-    def run(self, keys: Iterable[str]) -> None:
-        """Run those of some cases that are missing, and store what comes."""
-        jobs = list(self.plan.picked(self.missing.intersection(keys)))
-        if not jobs:
+    def run(self, jobs: Iterable[Job], keys: Iterable[str]) -> None:
+        """Run those of some jobs' cases that are missing, and store what comes."""
+        wanted = list(picked(jobs, self.missing.intersection(keys)))
+        if not wanted:
             return
-        arrivals = self.workers()(jobs)
+        arrivals = self.workers()(wanted)
         try:
             for outcomes in arrivals:
                 self.store.check_place()
@@ -217,9 +225,9 @@ class _Course:
                 arrivals.close()
 
 
-def _pruned(course: _Course) -> None:
+def _pruned(plan: Schedule, course: Course) -> None:
     """Bounds first; then designs wave by wave, less those that a bound condemns."""
-    plan, store, progress = course.plan, course.store, course.progress
+    store, progress = course.store, course.progress
     bounds: dict[int, list[str]] = {}
     solved: dict[int, dict[str, list[str]]] = {}
     for case in plan.planned:
@@ -227,7 +235,7 @@ def _pruned(course: _Course) -> None:
             bounds.setdefault(case.design, []).append(case.key)
         else:
             solved.setdefault(case.design, {}).setdefault(case.cycle, []).append(case.key)
-    course.run(key for keys in bounds.values() for key in keys)
+    course.run(plan.jobs, (key for keys in bounds.values() for key in keys))
     rows = store.rows(key for keys in bounds.values() for key in keys)
     figures = {key: _figure_of(row, "bound_l_per_100km") for key, row in rows}
     weights = {case.design: case.nox_weight for case in plan.planned}
@@ -247,7 +255,7 @@ def _pruned(course: _Course) -> None:
         course.missing.difference_update(gone)
         progress.total -= len(gone)
         progress.pruned += len(gone)
-        course.run(key for design in wave.designs for key in _all(solved[design]))
+        course.run(plan.jobs, (key for design in wave.designs for key in _all(solved[design])))
         objectives = {design: _objective(store, solved[design]) for design in wave.designs}
         try:
             wave = waves.send(objectives)

@@ -97,13 +97,21 @@ def read_study(path: str | Path) -> SweepStudy:
 
 def study_and_faults(path: Path) -> tuple[SweepStudy | None, list[str]]:
     """The study of a file, None where it has faults, and every fault, those beside wrong keys as well."""
-    contents = read_contents(path)
+    return contents_and_faults(path, read_contents(path))
+
+
+def contents_and_faults(
+    path: Path, contents: dict[str, Any], *, open_ranges: bool = False
+) -> tuple[SweepStudy | None, list[str]]:
+    """The same of contents that are read already; open_ranges: whether a range needs no count."""
     faults = _without_misplaced(contents)
     faults += _with_flat_parameters(contents)
     count, in_model = faults_of(contents, StudyFile, _MODEL_FAULTS)
     faults += in_model + ([f"and {count - len(in_model)} more"] if count > len(in_model) else [])
     good, folder = good_keys(contents, StudyFile), path.parent
-    parameters = _parameters(good.get("parameters", {}), "sample" in contents, faults)
+    parameters = _parameters(
+        good.get("parameters", {}), open_ranges or "sample" in contents, faults
+    )
     architecture, car = _car(folder, good.get("architecture"), faults)
     cycles = _cycles(folder, good.get("cycles", ()), faults)
     strategies = good.get("strategies", ())
