@@ -41,6 +41,7 @@ _HOME = {
     "read_saved_steps": "hevopt.pages.comparison.frames",
     "sweep": "hevopt.sweeps.sweep",
     "read_sweep": "hevopt.sweeps.store.frames",
+    "size": "hevopt.sizing.size",
     "import_cycle": "hevopt.measured.cycles.cycle",
     "import_drives": "hevopt.measured.cycles.cycle",
     "import_map": "hevopt.measured.maps.component",
