@@ -21,7 +21,7 @@ from hevopt.studies.provenance import files_digests
 from hevopt.sweeps.into_store import check_sweep
 from hevopt.sweeps.plan.jobs import Job
 from hevopt.sweeps.plan.parameters import Range
-from hevopt.sweeps.run import Advance, Course, Execution, Onlookers, meta_of
+from hevopt.sweeps.run import Advance, CasesRun, Execution, Onlookers, meta_of
 from hevopt.sweeps.store.lock import locked
 from hevopt.sweeps.store.store import Store, open_store
 from hevopt.sweeps.workers.backends import workers
@@ -125,7 +125,7 @@ def sized(study: Path, place: Path, execution: Execution, command: str, watch: O
             scheduler=execution.scheduler, notice=watch.notice,
         )  # fmt: skip
         when_needed = cache(lambda: stack.enter_context(team))
-        course = Course(
+        course = CasesRun(
             opened,
             when_needed,
             Advance(0),
@@ -171,7 +171,7 @@ def _proofs(found: Sizing, best: Candidate) -> tuple[RangeProof, ...]:
     )
 
 
-def _runner(store: Store, course: Course) -> Callable[[Sequence[Job], Iterable[str]], None]:
+def _runner(store: Store, course: CasesRun) -> Callable[[Sequence[Job], Iterable[str]], None]:
     def run(jobs: Sequence[Job], keys: Iterable[str]) -> None:
         missing = set(keys) - set(store.endings())
         course.missing.update(missing)

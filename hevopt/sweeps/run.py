@@ -183,7 +183,7 @@ def run_sweep(
         )  # fmt: skip
         # With bounds and incumbents all in the store there may be nothing to start workers for.
         team_when_needed = cache(lambda: stack.enter_context(team))
-        course = Course(store, team_when_needed, progress, watch, missing)
+        course = CasesRun(store, team_when_needed, progress, watch, missing)
         if prune:
             _pruned(plan, course)
         else:
@@ -193,7 +193,7 @@ def run_sweep(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class CasesRun:
     """A sweep under way. workers: starts them at the first call; missing: keys of the cases still to run."""
 
     store: Store
@@ -225,7 +225,7 @@ class Course:
                 arrivals.close()
 
 
-def _pruned(plan: Schedule, course: Course) -> None:
+def _pruned(plan: Schedule, course: CasesRun) -> None:
     """Bounds first; then designs wave by wave, less those that a bound condemns."""
     store, progress = course.store, course.progress
     bounds: dict[int, list[str]] = {}
