@@ -24,6 +24,7 @@ from hevopt.commands import (
     turbo,
     validation,
 )
+from hevopt.commands.grouped import GroupedCommands, GroupedOptions
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError, HevoptError, SolverError, comes_from_interrupt
@@ -36,6 +37,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    cls=GroupedCommands,
 )
 
 _INTERRUPTED = 130
@@ -69,7 +71,7 @@ for command in (
     validation.validation,
     turbo.tipin,
 ):
-    app.command()(command)
+    app.command(cls=GroupedOptions)(command)
 app.add_typer(listing.architectures_app, name="architectures")
 listing.cycles_app.command("import")(importing.import_cycle)
 app.add_typer(listing.cycles_app, name="cycles")

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +81,7 @@ class Files:
 
     out: rows; steps: every step of every row; page, save: the report and what it is made from, with fronts and
     effects (sensitivities) of every car where asked for; proofs: the folder that every row's bound goes to
+    nox_limit: what the page draws a line at, mg/km
     """
 
     out: Path | None
@@ -89,6 +91,7 @@ class Files:
     proofs: Path | None
     fronts: bool
     effects: bool
+    nox_limit: float | None = None
     _collector: "Collector | None" = field(default=None, init=False)
     _proven: list[tuple[str, Any, Any]] = field(default_factory=list, init=False)
     _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
@@ -114,7 +117,12 @@ class Files:
 
             for car in job.cars.cars:
                 require_nox(car, "--fronts")
+        limit = self.nox_limit
+        if limit is not None and not 0 < limit < inf:
+            raise DataError(f"--nox-limit {limit:g}; allowed: mg/km above 0")
         if self.page is None and self.save is None:
+            if limit is not None:
+                raise DataError("--nox-limit is drawn on the page; name it with --report or --save")
             if self.fronts or self.effects:
                 raise DataError(
                     "--fronts and --sensitivity add to the page; name it with --report or --save"
@@ -177,7 +185,7 @@ class Files:
             changes=job.cars.said(),
             others=job.others,
             published=job.is_study,
-        )
+        ).model_copy(update={"nox_limit_mg_per_km": self.nox_limit})
         extras = Extras(job.cars, job.trace, job.settings, self.fronts, self.effects)
         with Progress() as progress:
             results, failures = with_studies(results, extras, progress)

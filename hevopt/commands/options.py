@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from hevopt.commands.grouped import CAR, SOLVING
 from hevopt.commands.terminal import listed
 from hevopt.errors import DataError
 from hevopt.files.shown import shown
@@ -20,32 +21,44 @@ WideOption = Annotated[
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
 
 
-def _number(option: str, text: str) -> Any:
-    return Annotated[float | None, typer.Option(option, help=text)]
+def _number(option: str, text: str, group: str = CAR) -> Any:
+    return Annotated[float | None, typer.Option(option, help=text, rich_help_panel=group)]
 
 
 def _flag(option: str, text: str) -> Any:
-    return Annotated[bool | None, typer.Option(f"--{option}/--no-{option}", help=text)]
+    named = f"--{option}/--no-{option}"
+    return Annotated[bool | None, typer.Option(named, help=text, rich_help_panel=SOLVING)]
 
 
 # Field of studies.settings.Settings -> its option; a test holds the two together.
 SETTINGS: dict[str, Any] = {
     "strategies": Annotated[
-        str | None, typer.Option("--strategies", help="Names, separated by commas, or all.")
+        str | None,
+        typer.Option(
+            "--strategies", help="Names, separated by commas, or all.", rich_help_panel=SOLVING
+        ),
     ],
-    "nox_weight": _number("--nox-weight", "kg of fuel that a kg of NOx counts (ecms, dp, bound)."),
+    "nox_weight": _number(
+        "--nox-weight", "kg of fuel that a kg of NOx counts (ecms, dp, bound).", SOLVING
+    ),
     "allow_shortfall": _flag(
         "allow-shortfall", "Drive on where the car cannot follow, and mark the rows."
     ),
     "free_gear": _flag("free-gear", "The engine's gear is a control, not the cycle's."),
     "refine": _flag("refine", "Add torque levels around dp's plan until its cost settles."),
-    "horizon_s": _number("--horizon", "Preview of the predictive strategies, s (default 20)."),
+    "horizon_s": _number(
+        "--horizon", "Preview of the predictive strategies, s (default 20).", SOLVING
+    ),
     "soc_start": _number("--soc-start", "State of charge at the start, 0 to 1."),
     "soc_min": _number("--soc-min", "Lower end of the window of the state of charge."),
     "soc_max": _number("--soc-max", "Upper end of that window."),
     "soc_end": Annotated[
         str | None,
-        typer.Option("--soc-end", help="Least state of charge at the end: neutral, or 0 to 1."),
+        typer.Option(
+            "--soc-end",
+            help="Least state of charge at the end: neutral, or 0 to 1.",
+            rich_help_panel=CAR,
+        ),
     ],
     "auxiliaries_w": _number("--auxiliaries", "Electric load of the on-board network, W."),
     "mass_kg": _number("--mass", "Mass of the car without the parts of the hybrid, kg."),
@@ -56,6 +69,7 @@ SETTINGS: dict[str, Any] = {
         typer.Option(
             "--set",
             metavar="KEY=VALUE",
+            rich_help_panel=CAR,
             help="Any key of the architecture or of a component by its path, the value as in TOML, such as "
             "machine.power_max_w=2e4 or engine.scale.displacement=1.25; can be repeated.",
         ),

@@ -1,4 +1,4 @@
-"""`hevopt report`: the page of saved results, or of a sweep's store."""
+"""`hevopt report`: the page of saved results, of a sweep's store, or of a folder of saved results."""
 
 import shlex
 import sys
@@ -14,7 +14,10 @@ from hevopt.files.shown import encodable
 
 def report(
     file: Annotated[
-        Path, typer.Argument(help="What hevopt compare --save wrote, or the store of a sweep.")
+        Path,
+        typer.Argument(
+            help="What hevopt compare --save wrote, the store of a sweep, or a folder of saved comparisons."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", help="The HTML page to write.")],
 ) -> None:

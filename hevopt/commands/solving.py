@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from hevopt.commands.brought import PolicyOption
+from hevopt.commands.grouped import FILES, PAGE
 from hevopt.commands.options import (
     ArchitectureArgument,
     CycleGivenOption,
@@ -38,28 +39,56 @@ def compare(
     json: JsonOption = False,
     wide: WideOption = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write the rows to this .csv, .parquet or .json.")
+        Path | None,
+        typer.Option(
+            "--out", help="Write the rows to this .csv, .parquet or .json.", rich_help_panel=FILES
+        ),
     ] = None,
     steps: Annotated[
         Path | None,
         typer.Option(
-            "--out-steps", help="Write every step of every row to this .csv, .parquet or .json."
+            "--out-steps",
+            help="Write every step of every row to this .csv, .parquet or .json.",
+            rich_help_panel=FILES,
         ),
     ] = None,
     page: Annotated[
         Path | None,
-        typer.Option("--report", help="Write an HTML page that opens offline to this file."),
+        typer.Option(
+            "--report",
+            help="Write an HTML page that opens offline to this file.",
+            rich_help_panel=FILES,
+        ),
     ] = None,
     save: Annotated[
         Path | None,
-        typer.Option("--save", help="Save all results to this file (JSON, gzip), for report."),
+        typer.Option(
+            "--save",
+            help="Save all results to this file (JSON, gzip), for report.",
+            rich_help_panel=FILES,
+        ),
     ] = None,
     proofs: Annotated[
         Path | None,
-        typer.Option("--proof", help="Write every bound as a proof that others can check, there."),
+        typer.Option(
+            "--proof",
+            help="Write every bound as a proof that others can check, there.",
+            rich_help_panel=FILES,
+        ),
+    ] = None,
+    nox_limit: Annotated[
+        float | None,
+        typer.Option(
+            "--nox-limit", help="Draw a limit of NOx on the page, mg/km.", rich_help_panel=PAGE
+        ),
     ] = None,
     fronts: Annotated[
-        bool, typer.Option("--fronts", help="Add every car's front of fuel and NOx to the page.")
+        bool,
+        typer.Option(
+            "--fronts",
+            help="Add every car's front of fuel and NOx to the page.",
+            rich_help_panel=PAGE,
+        ),
     ] = False,
     effects: Annotated[
         bool, typer.Option("--sensitivity", help="Add every car's sensitivities to the page.")
@@ -87,7 +116,7 @@ def compare(
     settings, others = brought_to(asked.settings, policy, folder)
     cars = cars_of(asked.architectures, settings)
     job = ComparisonJob(cars, load_cycle(asked.cycle), settings, study_path, others)
-    files = Files(out, steps, page, save, proofs, fronts, effects)
+    files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit)
     files.check(job)
     compared = partial(study.compare_cars, cars.cars, settings=settings, others=others)
     say_how_long(job.trace, compared)

@@ -1,5 +1,6 @@
 """What a sweep came to: as it ends, by `--status`, or as a table in a file."""
 
+import tomllib
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -68,6 +69,22 @@ def _say_standing(reader: "Reader") -> None:
         write(f"and {more} more NOx weights; --export lists them")
     for line in discarded(reader):
         write(line)
+    write(_foot(reader.meta().get("study", "")))
+
+
+def _foot(study: str) -> str:
+    """What the figures above hold for: warm engine, gears, and the mean over which cycles."""
+    try:
+        named = tomllib.loads(study).get("cycles", [])
+    except tomllib.TOMLDecodeError:
+        named = []
+    cycles = [printable(Path(name).name) for name in named if isinstance(name, str)]
+    mean = f"; figures: mean over {', '.join(cycles)}" if len(cycles) > 1 else ""
+    on = f"; cycle: {cycles[0]}" if len(cycles) == 1 else ""
+    return (
+        "warm engine from start to end; gears as a cycle lists them, else by the car's own shift speeds"
+        f"{mean}{on}"
+    )
 
 
 def show_status(path: Path) -> None:

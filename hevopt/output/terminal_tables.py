@@ -151,7 +151,7 @@ def comparison_notes(comparison: Comparison) -> str:
     objective = "fuel"
     if comparison.nox_weight:
         objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
-    gears = "as the cycle gives them, or by the car's own shift speeds"
+    gears = f"as {comparison.cycle} lists them, else by the car's own shift speeds"
     if comparison.free_gear:
         gears = "chosen with the plan"
     return (
@@ -164,7 +164,7 @@ def comparison_notes(comparison: Comparison) -> str:
         f"{_peeking_note(comparison)}"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
         "lower-bound DP = a cost-to-go nowhere above the true one.\n"
-        f"The engine is warm from start to end; gears: {gears}."
+        f"The engine is warm from start to end; gears: {gears}; figures are of this cycle alone."
         f"{_nox_note(comparison)}"
         f"{_lost_note(comparison)}"
         f"{_forward_note(comparison)}"

@@ -22,14 +22,17 @@ from hevopt.pages.words import explained
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render(template: str, scripts: tuple[str, ...], data: bytes, **context: Any) -> str:
+def render(
+    template: str, scripts: tuple[str, ...], data: bytes, *, figures: bool = True, **context: Any
+) -> str:
     """The page of a template as HTML.
 
     scripts: files of `templates/` that draw it, in order; data: what they draw, packed with gzip
+    figures: whether there are any, for which the page carries the drawing library along
     """
-    library, digest = _plotly()
+    library, digest = _plotly() if figures else ("", "")
     code = "".join(_own(name) for name in ("page.js", *scripts))
-    allowed = " ".join(f"'sha256-{d}'" for d in (digest, _digest(code)))
+    allowed = " ".join(f"'sha256-{d}'" for d in (digest, _digest(code)) if d)
     page = _environment().get_template(template).render(
         policy=f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'",

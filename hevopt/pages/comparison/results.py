@@ -205,6 +205,7 @@ class Results(FileModel):
     inputs: file -> SHA-256; versions: name -> version; failures: architecture, or it and strategy -> message
     lost_proofs: architecture and kind of proof -> why it was tried and not found
     peeking: car and strategy -> what shows that a strategy from outside knows more of the cycle than it says
+    nox_limit_mg_per_km: a limit to hold rows against, where one was given
     """
 
     format: Literal["hevopt comparison 2"] = FORMAT
@@ -228,6 +229,7 @@ class Results(FileModel):
     published: list[PublishedFigure]
     pareto: list[ParetoFront] | None = None
     sensitivity: list[Sensitivity] | None = None
+    nox_limit_mg_per_km: Number | None = None
 
     def text(self) -> bytes:
         """As JSON."""

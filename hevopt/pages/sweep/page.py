@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+import tomllib
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,9 @@ def sweep_page(sweep: Sweep) -> str:
         ("sweep.js",),
         _packed(data.encode()),
         sweep=sweep,
-        title=f"Sweep {sweep.name}",
+        title=f"Sweep {_study_file(sweep).name or sweep.name}",
+        architecture=_architecture(sweep),
+        weighted=bool(figures.weight.any()),
         verdict=verdict(sweep, groups),
         alerts=alerts(sweep, groups),
         groups=groups,
@@ -82,6 +85,15 @@ def sweep_page(sweep: Sweep) -> str:
 
 def _study_file(sweep: Sweep) -> Path:
     return Path(sweep.meta.get("study_file", ""))
+
+
+def _architecture(sweep: Sweep) -> str | None:
+    """The car that the study names, without folders; None where the store has no study that can be read."""
+    try:
+        named = tomllib.loads(sweep.meta.get("study", "")).get("architecture")
+    except tomllib.TOMLDecodeError:
+        return None
+    return printable(Path(named).name) if isinstance(named, str) else None
 
 
 def _facts(sweep: Sweep) -> dict[str, str]:

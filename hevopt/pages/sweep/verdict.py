@@ -86,7 +86,7 @@ def _best(figures: DesignFigures, group: Group) -> str:
             f"objectives of {len(np.unique(figures.weight))} NOx weights do not compare, so no design is called "
             "the best: see the front of fuel and NOx"
         )
-    where = f"at NOx weight {group.label}, "
+    where = f"at NOx weight {group.label}, " if figures.weight.any() else ""
     named = f"design {figures.number[n]}{_described(figures, n)}"
     if figures.short[n]:
         return (

@@ -32,6 +32,9 @@ const AllRows = (() => {
   const { HATCHES, DASHES, SYMBOLS, styleOf, nameOf, short, shortNameOf, narrow, fixed } = Look;
   const MODE_COLOURS = [0, 9, 3, 6, 4, 2, 1, 5];
 
+  // What a label needs of a figure's height.
+  const LABEL_SHARE = 0.065;
+
   // Bars ----------------------------------------------------------------------------------------------------------
 
   function places() {
@@ -59,8 +62,8 @@ const AllRows = (() => {
     };
   }
 
-  // value and bound: figures -> per cent, or null
-  function bars(value, bound, title) {
+  // value and bound: figures -> number, or null; told: of a value; limit: drawn across, or null
+  function bars(value, bound, title, { told = signed, unit = "%", limit = null } = {}) {
     return (look, width) => {
       const slots = places(), data = [];
       for (const strategy of Shown.names) {
@@ -70,7 +73,7 @@ const AllRows = (() => {
           type: "bar", name: plain(strategy), x: own.map((s) => s.x), y: own.map((s) => value(s.row.figures)), width: 0.86,
           marker: { color: look.colours[n % 10], line: { color: look.ink, width: 0.6 },
             pattern: { shape: HATCHES[(n + 3 * Math.floor(n / 10)) % 10], fillmode: "overlay", fgcolor: look.hatch, size: 6, solidity: 0.35 } },
-          customdata: own.map((s) => plain(nameOf(s.row))), hovertemplate: "%{customdata}: %{y:+.2f} %<extra></extra>",
+          customdata: own.map((s) => plain(nameOf(s.row))), hovertemplate: `%{customdata}: %{y:${unit === "%" ? "+.2f" : ".1f"}} ${unit}<extra></extra>`,
         });
       }
       const valued = slots.filter((slot) => value(slot.row.figures) !== null);
@@ -86,20 +89,27 @@ const AllRows = (() => {
         data.push({ type: "scatter", mode: "lines", name: "certified bound", x: xs, y: ys, text: texts, line: { color: look.ink, width: 2.5 },
           hovertemplate: "%{text}, bound: %{y:+.3f} %<extra></extra>" });
       }
+      const ends = valued.flatMap((s) => [value(s.row.figures), bound?.(s.row.figures) ?? 0]);
       const span = slots[slots.length - 1].x + 2, slot = (width - 80) / span;
+      const spare = LABEL_SHARE * (Math.max(0, ...ends) - Math.min(0, ...ends));
       const labels = slot <= 30 ? [] : valued.map((s) => {
-        const v = value(s.row.figures), below = v > 0;
-        return { x: s.x, y: 0, text: Math.abs(v) < 0.05 ? "+0.0" : `${v > 0 ? "+" : ""}${fixed(v, 1)}`, showarrow: false, yanchor: below ? "top" : "bottom", yshift: below ? -2 : 2, font: { size: 11, color: look.ink } };
+        const v = value(s.row.figures), at = bound?.(s.row.figures) ?? v, up = v > 0 || (v === 0 && !bound);
+        // On the bar's own side: between it and its bound where there is room, else beyond the bound.
+        const end = Math.abs(at - v) > spare ? v : up ? Math.max(v, at) : Math.min(v, at);
+        return { x: s.x, y: end, text: told(v), showarrow: false, yanchor: up ? "bottom" : "top", yshift: up ? 2 : -3, font: { size: 11, color: look.ink } };
       });
-      const all = valued.flatMap((s) => [value(s.row.figures), bound ? bound(s.row.figures) ?? 0 : 0]);
-      const low = Math.min(0, ...all), high = Math.max(0, ...all), room = Math.max(0.09 * (high - low), 0.5);
+      const all = [...ends, limit ?? 0];
+      const low = Math.min(0, ...all), high = Math.max(0, ...all), room = Math.max(0.09 * (high - low), 0.5), down = low < 0 ? room : 0;
       return { data, layout: layout(look, width, {
         xaxis: axis(look, "architecture", { ...groupTicks(slots), range: [-1, slots[slots.length - 1].x + 1], showgrid: false, zeroline: false, fixedrange: true, ticks: "" }),
-        yaxis: axis(look, title, { range: [low - room, high + room], zeroline: true, zerolinewidth: 1.2, fixedrange: true }),
+        yaxis: axis(look, title, { range: [low - down, high + room], zeroline: true, zerolinewidth: 1.2, fixedrange: true }),
         margin: { l: 62, r: 10, t: 12, b: 44 }, annotations: labels,
+        shapes: limit === null ? [] : [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: limit, y1: limit, line: { color: look.ink, width: 1.6, dash: "dash" }, label: { text: `limit ${limit} mg/km`, textposition: "end", font: { size: 11, color: look.ink } } }],
       }) };
     };
   }
+
+  const signed = (v) => (Math.abs(v) < 0.05 ? "+0.0" : `${v > 0 ? "+" : ""}${fixed(v, 1)}`);
 
   function change() {
     const reference = Shown.results.rows.find((row) => nameOf(row) === Shown.results.reference);
@@ -111,6 +121,7 @@ const AllRows = (() => {
     figure("fuel-bars", bars((f) => f.delta_fuel_percent, weighted ? null : (f) => part(f.bound_l_per_100km, base.fuel_l_per_100km), `fuel, ${against}`));
     figure("cost-bars", bars((f) => part(cost(f), cost(base)), (f) => part(f.bound_l_per_100km, cost(base)), `objective, ${against}`));
     figure("nox-bars", bars((f) => f.delta_nox_percent, null, `NO<sub>x</sub>, ${against}`));
+    figure("nox-level-bars", bars((f) => f.nox_mg_per_km, null, "NO<sub>x</sub> (mg/km)", { told: (v) => fixed(v, 0), unit: "mg/km", limit: Shown.results.nox_limit_mg_per_km ?? null }));
   }
 
   // Operation -------------------------------------------------------------------------------------------------------

@@ -78,11 +78,18 @@ const Page = (() => {
     element.querySelector(".missing")?.remove();
     Plotly.react(element, made.data, { ...made.layout, width, height }, config);
     made.after?.(element);
+    nameButtons(element);
     // On paper and back the library begins anew, without what listened to it.
     for (const [name, act] of Object.entries(made.on ?? {})) {
       element.removeAllListeners(name);
       element.on(name, act);
     }
+  }
+
+  // The library names its buttons alike in every figure.
+  function nameButtons(element) {
+    const whole = element.getAttribute("aria-label").split(/[.:;]/)[0];
+    for (const button of element.querySelectorAll(".modebar-btn")) button.setAttribute("aria-label", `${button.dataset.title}: ${whole}`);
   }
 
   function figure(id, build) {
@@ -152,14 +159,18 @@ const Page = (() => {
     heads.forEach((head) => head.removeAttribute("aria-sort"));
     heads[column].setAttribute("aria-sort", down ? "descending" : "ascending");
     table.tBodies[0].append(...keyed.map((entry) => entry.row));
-    const name = heads[column].querySelector(".what").textContent;
+    const { name } = heads[column].querySelector("button").dataset;
     say(`sorted by ${name}, ${down ? "descending" : "ascending"}`);
   }
 
   function sortable() {
     for (const table of document.querySelectorAll("table.sortable")) {
+      // The caption up to where a sentence or a part of it ends: buttons of several tables are told apart by it.
+      const whole = table.caption.textContent.trim().split(/[.:;,]/)[0];
       [...table.tHead.rows[0].cells].forEach((head, column) => {
-        head.querySelector("button").addEventListener("click", () => sortBy(table, column));
+        const button = head.querySelector("button"), unit = head.querySelector(".unit")?.textContent.trim();
+        button.setAttribute("aria-label", `${button.dataset.name}${unit ? ` (${unit})` : ""}: sort ${whole}`);
+        button.addEventListener("click", () => sortBy(table, column));
       });
     }
   }
@@ -197,6 +208,10 @@ const Page = (() => {
   async function start(draws) {
     sortable();
     for (const button of document.querySelectorAll("[data-copies]")) button.addEventListener("click", () => copy(button));
+    if (!byId("packed-library").textContent) {
+      document.documentElement.dataset.drawn = "yes";
+      return;
+    }
     await painted();
     try {
       const data = JSON.parse(await unpacked("packed-data"));

@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from page_helpers import AXES, effect, front, settle
+from page_helpers import AXES, effect, front, settle, until
 
 from hevopt.pages.comparison.page import comparison_page
 
@@ -172,7 +172,7 @@ def test_long_names_are_short_in_axes_and_legends_and_whole_where_the_mouse_rest
 def test_bounds_of_fronts_are_seen_on_the_points_they_hold(nedc, opened, tmp_path):
     fronts = {"pareto": [front("C2"), front("D")]}
     fronts["pareto"][1]["points"][1] |= {"nox_weight": 1570.0, "nox_weights": [1570.0, 2000.4]}
-    contents = json.loads(nedc.results.model_dump_json()) | fronts
+    contents = json.loads(nedc.results.model_dump_json()) | fronts | {"nox_limit_mg_per_km": 180.0}
     path = tmp_path / "fronts.html"
     path.write_text(comparison_page(type(nedc.results).model_validate(contents)), encoding="utf-8")
     page = opened(path).page
@@ -188,6 +188,10 @@ def test_bounds_of_fronts_are_seen_on_the_points_they_hold(nedc, opened, tmp_pat
     weights = page.locator("#pareto td[data-key=nox_weight]").all_inner_texts()
     assert weights == ["0", "10", "0", "1570 to 2000"]
     assert "--fronts" not in page.locator("#left-out").inner_text()
+    # A limit that is given is a line over the bars of NOx.
+    (line,) = page.evaluate("document.getElementById('nox-level-bars').layout.shapes")
+    assert [line["y0"], line["y1"]] == [180, 180] and line["label"]["text"] == "limit 180 mg/km"
+    assert "180 mg/km" in page.locator("#figure-nox-level-bars figcaption").inner_text()
 
 
 def test_sensitivities_stand_in_one_order_and_their_table_sorts(nedc, opened, tmp_path):
@@ -206,3 +210,61 @@ def test_sensitivities_stand_in_one_order_and_their_table_sorts(nedc, opened, tm
     assert names.all_inner_texts() == ["drag", "load", "mass"]
     page.locator("[data-effects] thead button").first.click()
     assert names.all_inner_texts() == ["mass", "load", "drag"]
+
+
+BARS = """id => {
+  const { data, layout } = document.getElementById(id);
+  return [data.filter(t => t.type === 'bar').flatMap(t => t.x.map((x, n) => [x, t.y[n]])),
+    layout.annotations.map(a => [a.x, a.y, a.yanchor])];
+}"""
+
+
+@pytest.mark.parametrize("figure", ["fuel-bars", "nox-bars", "nox-level-bars"])
+def test_a_bar_has_its_figure_on_its_own_side(nedc, shown, figure):
+    bars, labels = shown.page.evaluate(BARS, figure)
+    assert len(labels) == len(bars) == 20
+    height = dict(map(tuple, bars))
+    for x, y, anchor in labels:
+        if abs(height[x]) > 0.05:
+            assert (y > 0) == (height[x] > 0) and abs(y) >= abs(height[x]) - 1e-9
+            assert anchor == ("bottom" if y > 0 else "top")
+    if figure == "nox-level-bars":
+        nox = sorted(row.figures.nox_mg_per_km for row in nedc.results.rows)
+        assert sorted(height.values()) == pytest.approx(nox)
+
+
+def test_nothing_that_matters_lies_behind_a_scroll_at_1200_px(shown):
+    page = shown.page
+    page.set_viewport_size({"width": 1200, "height": 1400})
+    drawn = "[...document.querySelectorAll('figure:not([hidden]) .plot')].every(p => p._fullLayout.width < 1200)"
+    until(page, drawn)
+    wide = page.evaluate(
+        "[...document.querySelectorAll('.scroll, .plot')].filter(s => s.offsetParent)"
+        ".filter(s => s.scrollWidth > s.clientWidth)"
+        ".map(s => s.textContent.slice(0, 60))"
+    )
+    page.set_viewport_size({"width": 1440, "height": 1400})
+    until(page, "document.getElementById('traces')._fullLayout.width > 1200")
+    assert wide == []
+    heads = page.locator("#comparison thead .what").all_inner_texts()
+    assert heads[:8] == [
+        "Car",
+        "Strategy",
+        "Fuel",
+        "Change",
+        "Fuel corr.",
+        "Gap",
+        "Bound",
+        "Status",
+    ]
+
+
+def test_every_button_has_a_name_of_its_own(shown):
+    names = shown.page.evaluate(
+        "[...document.querySelectorAll('button')].filter(b => b.offsetParent)"
+        ".map(b => b.getAttribute('aria-label') || b.textContent.trim())"
+    )
+    assert len(names) > 60 and all(names)
+    assert sorted(names) == sorted(set(names))
+    assert "C2 dp: show in detail" in names
+    assert "Change of NOx (%): sort Every architecture and strategy on nedc" in names

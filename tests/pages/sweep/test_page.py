@@ -121,7 +121,7 @@ def test_bounds_alone_rank_designs_where_nothing_else_was_asked_for():
     sweep = sweep_of(records)
     assert groups_of(sweep.figures)[0].ranked.tolist() == [1, 0, 2]
     assert (
-        "design 1 (a.length_mm 1) has the least bound"
+        "Design 1 (a.length_mm 1) has the least bound"
         in verdict(sweep, groups_of(sweep.figures))[0]
     )
     assert "<h1>Sweep s.sqlite</h1>" in sweep_page(sweep)
@@ -409,7 +409,8 @@ def viewed(browser, made):
 
 def test_the_command_report_makes_the_page_of_a_store(made, tmp_path):
     assert made.result.exit_code == 0, made.result.output
-    assert "<h1>Sweep study.sqlite</h1>" in made.path.read_text(encoding="utf-8")
+    text = made.path.read_text(encoding="utf-8")
+    assert "<h1>Sweep study.toml</h1>" in text and "architecture C2 · 8 designs" in text
     assert made.path.stat().st_size < 3e6
     other = tmp_path / "other.sqlite"
     other.write_bytes(b"SQLite format 3\0 and no more")
@@ -562,7 +563,11 @@ def test_a_design_that_does_not_follow_the_cycle_is_never_the_best_and_says_so()
     sweep = sweep_of([short(0, 3.0, 9), solved(1, 5.0), solved(2, 4.0), short(3, 2.9, 1)])
     groups = groups_of(sweep.figures)
     assert groups[0].ranked.tolist() == [2, 1, 3, 0]
-    assert verdict(sweep, groups)[0].startswith("At NOx weight 0, design 2 ")
+    assert verdict(sweep, groups)[0].startswith("Design 2 ")
+    # No weight was asked for, so none is shown.
+    assert "NOx weight" not in re.sub(
+        r"<(style|script).*?</\\1>", "", sweep_page(sweep), flags=re.S
+    )
     found, lines = said(sweep, "Steps not followed")
     assert found and "2 of 4 designs" in lines[0] and "up to 9 steps (design 0)" in lines[0]
     plane, words = plane_of(sweep.figures, groups)
