@@ -69,7 +69,7 @@ def test_on_paper_every_figure_is_drawn_light_and_within_the_page(shown):
     assert all(width <= 691 and paper in ("#fff", "#ffffff") for width, paper in looks)
     page.emulate_media(media="screen", color_scheme="light")
     settle(page)
-    assert page.evaluate("document.getElementById('traces')._fullLayout.width") > 690
+    page.wait_for_function("document.getElementById('traces')._fullLayout.width > 690")
     page.evaluate("Plotly.relayout('traces', {'xaxis.range[0]': 100, 'xaxis.range[1]': 200})")
     assert page.input_value("#from") == "100"  # zooming is still linked afterwards
     page.click("#whole")
