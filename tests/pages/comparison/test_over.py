@@ -39,7 +39,7 @@ def laid(nedc, shown):
 def test_excess_cost_is_that_of_the_trajectories_at_the_optimums_price(nedc, laid):
     at_s, excess_g = map(np.array, laid.evaluate(EXCESS))
     expected = spent_g(nedc, "C2", "conventional") - spent_g(nedc, "C2", "dp")
-    assert np.abs(excess_g - expected).max() < 1e-3 and excess_g[-1] > 5
+    assert np.abs(excess_g - expected).max() < 1e-3 and excess_g[-1] > 1
     case = nedc.solved["C2", "dp"][0]
     km, kgpl = case.cycle.distance_m / 1e3, case.car.engine.fuel_density_kgpm3 / 1e3
     corrected = [
