@@ -42,6 +42,10 @@ class Fault:
         return f"{self.place}: {self.text}"
 
 
+class CoarseTableWarning(UserWarning):
+    """A bound may be higher than what a control between those of its table costs."""
+
+
 class DataError(HevoptError):
     """An input is missing, malformed or not physical: one message, or a message made of faults of one place.
 

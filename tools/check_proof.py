@@ -16,6 +16,9 @@ and the lowest resistance. Where R is constant and U² linear in y, r is convex 
 `lower-bound DP` is a recursion instead: a cost-to-go that is piecewise linear, falling, and nowhere above the true
 one. A move is replaced by the greatest of its cell, so h = f + V(x + d) has one break in it; the chord of the least
 of all h at the nodes is above h by at most what it is at the breaks, and is lowered by that.
+Scope `continuous split`: the claim is for all that lies between the levels of a joint as well. For that the table
+holds virtual controls, counted among the others, no one's to choose, and what is taken off every cost of a step.
+That they stand for what lies between is trusted, as the table's other arrays are; the bound is derived again.
 Every sum is lowered by what rounding can have added: epsilon times its operations times the magnitudes in it.
 """
 
@@ -27,6 +30,7 @@ from pathlib import Path
 import numpy as np
 
 EPS, CELLS = np.finfo(float).eps, 256
+TABULATED, CONTINUOUS = "tabulated controls", "continuous split"
 
 
 def require(holds, reason):
@@ -86,16 +90,28 @@ class Battery:
         return np.where(inner < -1e-9, np.inf, rate), root
 
 
-def entries(t, b):
-    """Per step (cost, power, mode) of usable controls, but those of no use or that move more than the window."""
+def entries(t, b, virtual):
+    """Per step (cost, power, mode) of usable controls, but those of no use or that move more than the window.
+
+    virtual: whether virtual controls count; then none is left out for what it moves
+    """
+    order = np.argsort(t["virtual_step"], kind="stable")
+    ends = np.searchsorted(t["virtual_step"][order], np.arange(len(t["step_s"]) + 1))
     top, points = b.least(b.ends), np.append(np.clip(b.stored, b.low, b.high), b.ends)
     bottom = b.volt_low, 0.0, b.at(points)[2].max()
     for k, step_s in enumerate(t["step_s"]):
         power, keep = t["power_w"][k], t["usable"][k]
         stored = -b.drain(np.minimum(power, 0), *bottom)[0]
         moved = step_s * np.maximum(b.drain(power, *top)[0], stored)
-        keep = np.flatnonzero(keep & (moved <= (b.high - b.low) * (1 + 1e-6)))
         cost, mode = t["cost_kg"][k], t["mode"]
+        if virtual:
+            own = order[ends[k] : ends[k + 1]]
+            cost = np.append(cost, t["virtual_cost_kg"][own]) - t["virtual_slack_kg"][k]
+            power = np.append(power, t["virtual_power_w"][own])
+            mode = np.append(mode, t["virtual_mode"][own])
+            keep = np.flatnonzero(np.append(keep, np.ones(len(own), bool)))
+        else:
+            keep = np.flatnonzero(keep & (moved <= (b.high - b.low) * (1 + 1e-6)))
         keep, best = keep[np.lexsort((power[keep], cost[keep]))], []
         for m in range(t["modes"]):  # none that another of its mode beats in cost and power
             own = keep[mode[keep] == m]
@@ -158,7 +174,8 @@ def by_prices(t, b, proof):
         line = Straight(b, raised, [ohm.min() for ohm in ohms])
     total = np.where(np.arange(t["modes"]) == t["start_mode"], 0.0, np.inf)
     magnitude, fallen = price[-1] * abs(proof["end_j"]) + price[0] * b.start, 0.0
-    for k, (cost, power, mode) in enumerate(entries(t, b)):
+    virtual = proof["scope"] == CONTINUOUS
+    for k, (cost, power, mode) in enumerate(entries(t, b, virtual)):
         after, tilt = price[k] * t["step_s"][k], before[k] - price[k]
         taken = switching(t, k, "switch_energy_j")
         if k == 0:  # what is stored is known
@@ -199,7 +216,7 @@ def by_recursion(t, b, proof):
     value = np.tile(slope * np.maximum(end - grid, 0.0), (t["modes"], 1))
     worst = np.abs(t["cost_kg"]).max() + t["switch_fuel_kg"].max()
     unknown = worst * len(t["step_s"]) + 2 * value.max()
-    for k, (cost, power, mode) in reversed(list(enumerate(entries(t, b)))):
+    for k, (cost, power, mode) in reversed(list(enumerate(entries(t, b, False)))):
         after = np.full((t["modes"], n), unknown)
         for m in set(mode.tolist()):
             own = power[mode == m][:, None]
@@ -267,6 +284,13 @@ def follow(t, b, control):
 def derived(proof, t):
     """Bound, cost of the plan beside it, and stored energy at its end, of a proof and a table's arrays."""
     require((t["step_s"] > 0).all() and np.isfinite(t["cost_kg"]).all(), "table: steps or costs")
+    if proof["scope"] == CONTINUOUS:
+        require(t["virtual_slack_kg"].shape == t["step_s"].shape, "the table knows no split")
+        finite = all(
+            np.isfinite(t[f"virtual_{n}"]).all() for n in ("cost_kg", "power_w", "slack_kg")
+        )
+        known = np.isin(t["virtual_mode"], np.arange(t["switch_allowed"].shape[-1])).all()
+        require(finite and known and (t["virtual_slack_kg"] >= 0).all(), "virtual controls")
     t = t | {"start_mode": int(t["start_mode"]), "modes": t["switch_allowed"].shape[-1]}
     require(all(np.isfinite(proof[name]) for name in ("bound_kg", "end_j")), "no figures")
     b = Battery(t)
@@ -278,9 +302,10 @@ def derived(proof, t):
 def check(path):
     """What was proven, as a sentence; ValueError with the reason where nothing was."""
     proof = json.loads(path.read_text())
-    require(
-        proof["format"] == 1 and proof["scope"] == "tabulated controls", "format or scope unknown"
+    known = proof["scope"] == TABULATED or (
+        proof["scope"] == CONTINUOUS and proof["kind"] == "prices"
     )
+    require(proof["format"] == 2 and known, "format or scope unknown")
     with np.load(path.parent / Path(proof["table"]).name, allow_pickle=False) as file:
         t = {name: file[name] for name in sorted(file.files)}
     digest = hashlib.sha256()
@@ -294,7 +319,7 @@ def check(path):
     claim = proof["bound_kg"]
     require(claim <= bound, f"claimed {claim:.12g} kg, proven {bound:.12g} kg")
     require(end >= proof["end_j"], "the plan ends with less than the claim is for")
-    return f"proven: at least {claim:.9g} kg; its plan costs {cost:.9g} kg"
+    return f"proven, {proof['scope']}: at least {claim:.9g} kg; its plan costs {cost:.9g} kg"
 
 
 def main(paths):

@@ -8,11 +8,16 @@ while the rollout's gap is above a target.
     LP prices        a price per step, from a linear program, where the rollout touches the window (step_prices.py)
     lower-bound DP   a cost-to-go that is nowhere above the true one, for costs of switching (lower_dp.py)
 
-A bound holds for the tabulated controls, for every strategy alike. The first three hold for every end charge,
-moving with it by their price at the end; the last one for the asked end charge or more. Each is lowered by what
-rounding could have added (prices.py, lower_dp.py) and then held against the plan in hand: one above it is an error.
+Where it is known what lies between the levels of a table (virtual.py), a bound by prices holds for every split
+between them; else, as that of the lower-bound DP always, for the table's own controls, and a split between them
+might cost less. Of arrays of which nothing is known it is told what that may come to: by how much the bound of
+every second control lies higher (coarse.py). For every strategy of its scope it holds alike. The first three hold
+for every end charge, moving with it by their price at the end; the last one for the asked end charge or more. Each
+is lowered by what rounding could have added (prices.py, lower_dp.py) and then held against the plan in hand: one
+above it is an error.
 """
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -21,12 +26,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hevopt.bounds.coarse import COARSE, coarseness_kg, coarseness_text
 from hevopt.bounds.lines import Line
 from hevopt.bounds.lower_dp import lower_bound_kg
-from hevopt.bounds.prices import EPSILON, end_slack_j, one_price_dual
+from hevopt.bounds.prices import EPSILON, end_slack_j, one_price_dual, one_price_lines
 from hevopt.bounds.step_prices import costate_dual, lp_dual
+from hevopt.bounds.virtual import split_of
 from hevopt.display.facts import Shown
-from hevopt.errors import SolverError
+from hevopt.errors import CoarseTableWarning, SolverError
 from hevopt.problem.problem import Problem, Trajectory
 
 TARGET_GAP = 5e-4
@@ -45,9 +52,10 @@ class Proof(StrEnum):
 
 
 class Scope(StrEnum):
-    """What a bound speaks of: the table's controls, not a continuous split between them."""
+    """What a bound speaks of: the table's controls, or every split between them as well."""
 
     TABULATED = "tabulated controls"
+    CONTINUOUS = "continuous split"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +95,8 @@ class Certificate(Shown):
     at_least: kind of proof -> bound for end charges of end_min_j or more, end_slack_j less by rounding
     failures: kind of proof -> why it was tried and not found
     recursions: kind of proof -> from what its bound in at_least can be computed again
+    scope: of what the lines speak; at_least speaks of the table's controls
+    coarse_kg: by how much the bound of every second control lies higher, where nothing is known between them
     """
 
     end_min_j: float
@@ -95,16 +105,24 @@ class Certificate(Shown):
     failures: dict[Proof, str] = field(default_factory=dict)
     end_slack_j: float = 0.0
     recursions: dict[Proof, Recursion] = field(default_factory=dict)
+    scope: Scope = Scope.TABULATED
+    coarse_kg: float | None = None
 
     def _facts(self) -> dict[str, object]:
         bound_kg, proof = self.bound_kg(self.end_min_j)
         return {
             "bound_kg": bound_kg,
             "proof": proof,
+            "scope": self.claim(proof).scope,
+            **({} if self.coarse_kg is None else {"coarse_kg": self.coarse_kg}),
             "end_min_j": self.end_min_j,
             "price_kgpj": self.price_kgpj,
             "failures": list(self.failures),
         }
+
+    def claim(self, proof: Proof) -> Claim:
+        """What a bound of a kind of proof is: its kind and of what it speaks."""
+        return Claim(proof, self.scope if proof in self.proofs else Scope.TABULATED)
 
     def bound_kg(self, end_j: float) -> tuple[float, Proof]:
         """The highest proven bound for plans that end with at least `end_j`, and its kind of proof."""
@@ -151,19 +169,28 @@ def certify(
     """The certificate of a problem; with a rollout, its costate prices, and dearer rungs up to `target_gap`.
 
     A rung that fails is left out and named in `failures`. Raises SolverError where a bound is above the rollout.
+    Warns, CoarseTableWarning, where the controls may be too few for what lies between them to be no better, by more
+    than 0.05 %, and nothing is known of it.
     """
-    lines = list(one_price_dual(problem))
+    split = split_of(problem)
+    choices = None if split is None else split.choices
+    lines = list(one_price_dual(problem) if choices is None else one_price_lines(problem, choices))
     certificate = Certificate(
-        problem.end_min_j, {Proof.ONE_MULTIPLIER: lines}, end_slack_j=end_slack_j(problem)
+        problem.end_min_j,
+        {Proof.ONE_MULTIPLIER: lines},
+        end_slack_j=end_slack_j(problem),
+        scope=Scope.TABULATED if choices is None else Scope.CONTINUOUS,
+        coarse_kg=coarseness_kg(problem),
     )
+    _warn_of_coarseness(certificate)
     if rollout is None:
         return certificate
     worth = certificate.price_kgpj
     _gap(certificate, rollout)
-    _try_prices(certificate, Proof.COSTATE_PRICES, lambda: costate_dual(problem, rollout))
+    _try_prices(certificate, Proof.COSTATE_PRICES, lambda: costate_dual(problem, rollout, choices))
     gap = _gap(certificate, rollout)
     if gap > target_gap and _touches_window(problem, rollout):
-        _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout))
+        _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout, choices))
         gap = _gap(certificate, rollout)
     for nodes in LOWER_DP_NODES:
         if gap <= target_gap:
@@ -175,6 +202,12 @@ def certify(
             certificate.recursions[Proof.LOWER_BOUND_DP] = Recursion(nodes, worth)
         gap = _gap(certificate, rollout)
     return certificate
+
+
+def _warn_of_coarseness(certificate: Certificate) -> None:
+    bound_kg, coarse_kg = certificate.bound_kg(certificate.end_min_j)[0], certificate.coarse_kg
+    if coarse_kg is not None and coarse_kg > COARSE * abs(bound_kg):
+        warnings.warn(coarseness_text(coarse_kg, bound_kg), CoarseTableWarning, stacklevel=3)
 
 
 def _try_prices(certificate: Certificate, kind: Proof, lines: Callable[[], list[Line]]) -> None:

@@ -96,14 +96,18 @@ def drain_at_j(problem: Problem, choices: Choices, energy_j: float | Array) -> A
 
 @once
 def one_price_dual(problem: Problem) -> tuple[Line, ...]:
-    """Supporting lines of g up to its maximum; the best one comes last."""
-    choices = bounded_choices(problem)
+    """Supporting lines of g up to its maximum, of the table's controls; the best one comes last."""
+    return tuple(one_price_lines(problem, bounded_choices(problem)))
+
+
+def one_price_lines(problem: Problem, choices: Choices) -> list[Line]:
+    """The same of some choices, as of virtual.py."""
     worth = least_drain_j(problem, choices)
     rounding = priced_rounding(problem, choices, np.ones(choices.steps), tangents=False)
     priced = Priced(
         worth, np.ones(choices.steps), problem.end_min_j - problem.start_j, 1.0, rounding
     )
-    return tuple(dual(problem, choices, priced))
+    return dual(problem, choices, priced)
 
 
 def before_steps(price: Array) -> Array:

@@ -4,6 +4,11 @@ Two files hold a proof. The table, `NAME.table.npz`: arrays of the controls, of 
 NumPy's own format. The proof, `NAME.proof.json`: the claim, the prices (or, of the lower-bound DP, nodes and slope,
 from which it is computed again), the table's digest, and the plan beside it. `tools/check_proof.py` reads them.
 
+The scope says of what the claim speaks: of the table's controls, or of every split between them. For that the
+table holds virtual controls, too, which a bound counts and no plan may choose, and what is taken off every cost of
+a step (virtual.py). Who checks the proof trusts these arrays as he trusts the others: that they stand for what lies
+between the levels is shown in hevopt's own code, from the laws of the car, and not in the file.
+
 The digest is SHA-256 over the arrays by name, in alphabetic order, each as "name dtype shape" and its bytes.
 What is claimed is the certificate's bound less its own rounding allowance twice more, as who checks it rounds as
 well; of the lower-bound DP less what the slope of its relaxation counts for a cell of its grid, and a millionth, as
@@ -16,20 +21,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.bounds.certificate import Certificate, Proof, Scope
+from hevopt.bounds.certificate import Certificate, Proof
 from hevopt.bounds.lower_dp import slope_kgpj
 from hevopt.bounds.prices import EPSILON
+from hevopt.bounds.virtual import split_of
 from hevopt.problem.once import once
 from hevopt.problem.problem import Problem, Trajectory
 
-FORMAT = 1
+FORMAT = 2
 
 
 def table_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
     """The arrays of a problem that a proof speaks of, by name in alphabetic order.
 
     cost_kg, power_w, usable: (time, control); mode: (control,); step_s: (time,); switch_*: (mode, mode) or (time,
-    mode, mode); of the battery its curves over soc, capacity_as, coulombic_efficiency and window; the start
+    mode, mode); of the battery its curves over soc, capacity_as, coulombic_efficiency and window; the start.
+    virtual_*: (entry,) step, mode, cost and power of virtual controls; virtual_slack_kg: (time,) what is taken off
+    the costs of a step, where these count; all empty where nothing is known of what lies between the levels
     """
     table, pack = problem.table, problem.battery
     arrays = {
@@ -44,12 +52,24 @@ def table_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
         "start_mode": np.int64(problem.start_mode),
         "soc_start": np.float64(problem.soc_start),
     }
+    arrays |= _virtual_arrays(problem)
     for name in (
         "soc", "open_circuit_v", "discharge_ohm", "charge_ohm", "capacity_as", "coulombic_efficiency",
         "soc_min", "soc_max",
     ):  # fmt: skip
         arrays[name] = np.asarray(getattr(pack, name), dtype=np.float64)
     return {name: np.asarray(arrays[name], order="C") for name in sorted(arrays)}
+
+
+def _virtual_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
+    split, none = split_of(problem), np.zeros(0)
+    if split is None:
+        own = none.astype(np.int64), none.astype(np.int64), none, none, none
+    else:
+        step, control, cost_kg, power_w, slack_kg = split.virtual
+        own = step, problem.table.mode[control], cost_kg, power_w, slack_kg
+    names = "step", "mode", "cost_kg", "power_w", "slack_kg"
+    return {f"virtual_{name}": values for name, values in zip(names, own, strict=True)}
 
 
 @once
@@ -70,7 +90,7 @@ def proof_of(plan: Trajectory, certificate: Certificate) -> dict[str, Any]:
         own = _prices(plan, certificate, kind)
     return {
         "format": FORMAT,
-        "scope": str(Scope.TABULATED),
+        "scope": str(certificate.claim(kind).scope),
         "proof": str(kind),
         **own,
         "plan_cost_kg": plan.cost_kg,

@@ -62,9 +62,14 @@ _NEAR = 0.01
 _STRAIGHT = 1e-7
 
 
-def costate_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
-    """Lines of the dual whose prices follow the costate equation along a rollout, the highest last."""
-    return dual_of_shape(problem, rollout, _costate(problem, rollout))
+def costate_dual(
+    problem: Problem, rollout: Trajectory, choices: Choices | None = None
+) -> list[Line]:
+    """Lines of the dual whose prices follow the costate equation along a rollout, the highest last.
+
+    choices: those to count in place of the table's own, as of virtual.py
+    """
+    return dual_of_shape(problem, rollout, _costate(problem, rollout), choices)
 
 
 def costate_bound_kg(problem: Problem, rollout: Trajectory, end_price_kgpj: float) -> float:
@@ -89,17 +94,24 @@ def _costate(problem: Problem, rollout: Trajectory) -> Array:
     )
 
 
-def lp_dual(problem: Problem, rollout: Trajectory) -> list[Line]:
-    """Lines of the dual whose prices are the multipliers of the linear program, the highest last."""
-    return dual_of_shape(problem, rollout, lp_prices_kgpj(problem, rollout))
+def lp_dual(problem: Problem, rollout: Trajectory, choices: Choices | None = None) -> list[Line]:
+    """Lines of the dual whose prices are the multipliers of the linear program, the highest last.
+
+    choices: as above; the program is of the table's own, any prices being valid
+    """
+    return dual_of_shape(problem, rollout, lp_prices_kgpj(problem, rollout), choices)
 
 
-def dual_of_shape(problem: Problem, rollout: Trajectory, price: Array) -> list[Line]:
-    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0, up to its maximum."""
-    return dual(problem, *_priced(problem, rollout, price))
+def dual_of_shape(
+    problem: Problem, rollout: Trajectory, price: Array, choices: Choices | None = None
+) -> list[Line]:
+    """Lines of g over the scale of (time,) prices p_1 ... p_T >= 0, up to its maximum; choices: as above."""
+    return dual(problem, *_priced(problem, rollout, price, choices))
 
 
-def _priced(problem: Problem, rollout: Trajectory, price: Array) -> tuple[Choices, Priced]:
+def _priced(
+    problem: Problem, rollout: Trajectory, price: Array, choices: Choices | None = None
+) -> tuple[Choices, Priced]:
     """The choices of g, and their priced part at scale 1 for (time,) prices p_1 ... p_T >= 0.
 
     The shape is taken at a size of about 1, by a power of two, which no product of prices and energies overflows.
@@ -108,7 +120,8 @@ def _priced(problem: Problem, rollout: Trajectory, price: Array) -> tuple[Choice
     if not (np.isfinite(price).all() and (price >= 0).all()):
         raise SolverError("the prices of stored energy are not all finite and >= 0")
     price = np.ldexp(price, -np.frexp(price.max())[1])
-    choices = without_dominated(bounded_choices(problem))
+    if choices is None:
+        choices = without_dominated(bounded_choices(problem))
     inside = problem.battery.within_window()
     line = line_above(inside)
     start = State(problem.start_mode, problem.start_j)

@@ -19,7 +19,7 @@ from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-_PA_PER_BAR = 1e5
+PA_PER_BAR = 1e5
 
 
 class EngineLaw(Protocol):
@@ -134,14 +134,14 @@ class CompactLaw(Shown):
 
     def fuel_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
         """Fuel flow; 0 at or below the drag torque."""
-        k, cm = self.fuel, self._piston_speed_mps(speed_radps)
-        p_me = self._mean_pressure_bar(torque_nm)
+        k, cm = self.fuel, self.piston_speed_mps(speed_radps)
+        p_me = self.mean_pressure_bar(torque_nm)
         slope = k.a + k.b * cm + k.c * cm**2
         load = np.maximum(p_me - k.l - k.l2 * cm**2, 0.0)
         # Drag torque recomputed from p_me differs from 0 by rounding; a fuel cut must be exactly 0.
         load = np.where(load < 1e-9, 0.0, load)
         p_mf = 2 * load / (slope + np.sqrt(np.maximum(slope**2 + 4 * k.a2 * load, 0.0)))
-        power_w = p_mf * _PA_PER_BAR * self.displacement_m3 * speed_radps / (4 * pi)
+        power_w = p_mf * PA_PER_BAR * self.displacement_m3 * speed_radps / (4 * pi)
         return power_w / self.heating_value_jpkg
 
     def nox_kgps(self, torque_nm: Array, speed_radps: Array) -> Array:
@@ -150,7 +150,7 @@ class CompactLaw(Shown):
             return np.zeros(np.broadcast(torque_nm, speed_radps).shape)
         k = self.nox
         speed_rpm = speed_radps * 60 / (2 * pi)
-        p_me = np.maximum(self._mean_pressure_bar(torque_nm), 0.0)
+        p_me = np.maximum(self.mean_pressure_bar(torque_nm), 0.0)
         steepness = (p_me - k.p0 - k.p1 * (speed_rpm / 1000 - 2)) / k.dp
         specific_gpkwh = k.lo + (k.hi - k.lo) / (1 + np.exp(-steepness))
         # 1 bar on 1 litre is 100 J per working cycle, and g/kWh x 100 J = mg / 36.
@@ -160,8 +160,8 @@ class CompactLaw(Shown):
 
     def drag_nm(self, speed_radps: Array) -> Array:
         """Torque at which the fuel mean pressure is 0."""
-        k, cm = self.fuel, self._piston_speed_mps(speed_radps)
-        return (k.l + k.l2 * cm**2) * _PA_PER_BAR * self.displacement_m3 / (4 * pi)
+        k, cm = self.fuel, self.piston_speed_mps(speed_radps)
+        return (k.l + k.l2 * cm**2) * PA_PER_BAR * self.displacement_m3 / (4 * pi)
 
     def covered_nm(self, full_load_nm: Array, speed_radps: Array) -> Array:
         """Full load: coefficients have no end."""
@@ -175,11 +175,13 @@ class CompactLaw(Shown):
         """The same mean pressures in another displacement."""
         return replace(self, displacement_m3=factor * self.displacement_m3)
 
-    def _piston_speed_mps(self, speed_radps: Array) -> Array:
+    def piston_speed_mps(self, speed_radps: Array) -> Array:
+        """Mean piston speed, at speeds beyond the highest that of the highest."""
         return self.stroke_m * np.minimum(speed_radps, self.speed_max_radps) / pi
 
-    def _mean_pressure_bar(self, torque_nm: Array) -> Array:
-        return 4 * pi * torque_nm / self.displacement_m3 / _PA_PER_BAR
+    def mean_pressure_bar(self, torque_nm: Array) -> Array:
+        """Brake mean pressure of a torque."""
+        return 4 * pi * torque_nm / self.displacement_m3 / PA_PER_BAR
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

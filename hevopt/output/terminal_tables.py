@@ -8,6 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from hevopt.bounds.certificate import Scope
 from hevopt.files.shown import printable
 from hevopt.output.tables import needed_width, titled_table
 from hevopt.problem.problem import Plan
@@ -71,6 +72,12 @@ _COLUMNS = (
 # Only where another end charge than the start's is asked; before the corrected fuel.
 _BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", "z.2f"), 0)
 _BATTERY_PLACE = 7
+
+
+_SCOPES = {
+    Scope.CONTINUOUS: ", every torque between the levels of a joint",
+    Scope.TABULATED: ", the levels of a joint alone",
+}
 
 
 def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
@@ -158,8 +165,8 @@ def comparison_notes(comparison: Comparison) -> str:
         f"vs ref: against {_reference(comparison)}. corrected: fuel less what the end charge is worth "
         "(multiplier of the dual).\n"
         f"{_end_notes(comparison)}"
-        f"bound: no plan over the tabulated controls with that row's end charge has less {objective}; "
-        "gap: how far the row is above it.\n"
+        f"bound: no plan with that row's end charge has less {objective}; gap: how far the row is above it.\n"
+        f"{_scope_note(comparison)}"
         f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
         f"{_peeking_note(comparison)}"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
@@ -184,6 +191,21 @@ def _forward_note(comparison: Comparison) -> str:
         "\ndriven: forward by a driver at the pedals, charge-corrected; against: the row's own corrected fuel; "
         "missed: times that the trace was left." + "".join(told)
     )
+
+
+def _scope_note(comparison: Comparison) -> str:
+    """Of what the bounds speak, car by car where they differ."""
+    cars: dict[str, list[str]] = {}
+    for row in comparison.rows:
+        if row.certificate is not None:
+            named = cars.setdefault(str(row.certificate.scope), [])
+            named += [] if row.architecture in named else [row.architecture]
+    texts = [
+        f"{scope}{_SCOPES.get(scope, '')}"
+        + (f": {', '.join(map(printable, names))}" if len(cars) > 1 else "")
+        for scope, names in cars.items()
+    ]
+    return f"scope of the bounds: {'; '.join(texts)}\n" if texts else ""
 
 
 def _reference(comparison: Comparison) -> str:

@@ -13,9 +13,11 @@ from hevopt.car.balance import joints_of
 from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.car.parts import WHEEL
 from hevopt.powertrain.branches import Driven, Piece
+from hevopt.powertrain.cells import cells_of
 from hevopt.powertrain.kinetic import jumps_along
 from hevopt.powertrain.operation import Setting, completed, flowing, setting
 from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.cells import Cells, Figures
 from hevopt.problem.flows import Flows
 
 _NAMES = (
@@ -64,6 +66,9 @@ class PowerFlows(Flows):
     def _names(self) -> tuple[str, ...]:
         own = (f"{name}_{what}" for name in self.machines for what in ("torque_nm", "speed_radps"))
         return (*_NAMES, *own)
+
+    def cells(self, figures: Figures) -> Cells | None:
+        return cells_of(self.branches, figures)
 
     def states(self, control: Indices) -> list[State]:
         """The state of the driveline at each step of a plan."""

@@ -4,6 +4,12 @@ Every shaft is in balance: reactions of joints and torques of actuators equal wh
 with loss passes on less on the side that power leaves by; which side that is depends on the torques themselves, so
 that all combinations are tried and the one taken that agrees with its own result. A gearbox whose losses are a map
 is a lossless joint, and what it loses acts on its output; the torque in it follows in closed form.
+
+Slopes. Give a joint a drag e >= 0 more on the side that power leaves by: what it delivers there is then at most
+its share of lambda by either direction, two linear conditions. If no drag of any joint makes the engine's torque
+less, in whichever combination of directions, the torque without drags is the least under those conditions, of a
+linear program, and so convex in what is given, and every combination's line stays at or below it. Then the lines
+that agree at a point are slopes there, the steepest upwards and downwards those of its two sides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,12 +18,16 @@ from functools import lru_cache
 import numpy as np
 
 from hevopt.car.balance import acting_on, directions, joints_of, torques_of
+from hevopt.car.driveline import BRAKE, ENGINE
 from hevopt.car.gear_loss import GearLoss, loss_at
 from hevopt.car.linear import Coefficient
 from hevopt.car.parts import Joint
 from hevopt.car.ways import Way
 from hevopt.powertrain.shafts import Shafts
 from hevopt.problem.arrays import Array, Flags, Indices
+
+# Power against the direction assumed that is rounding, and a coefficient that is none.
+_POWER_W, _NOTHING = 1e-9, 1e-12
 
 
 class Torques:
@@ -86,6 +96,49 @@ class Torques:
         """(state, level) where a gearbox with a map has no data for a torque in it."""
         losses, gear = _data(joint, self.shafts)
         return losses.unknown(gear, self.shafts.speed_radps[joint.ends[0]], torque_nm)
+
+    def engine_slopes(self, name: str, torque_nm: Array) -> tuple[Array, Array] | None:
+        """(state, level) slopes of the engine's torque over that of one actuator, towards less and more of it.
+
+        All else is solved for, but the friction brakes where something else moves the wheels: these rest. None
+        where the torque is not shown to be convex, as with the losses of a gearbox in a map.
+        """
+        if self._mapped:
+            return None
+        braked = self.way.slack is not None and self.way.slack != name
+        names = tuple(sorted({name, BRAKE} if braked else {name}))
+        terms = _terms(self.way, names, self.way.shafts, (name,), (ENGINE,))
+        gear = self.shafts.gear if terms.shape[-1] > 1 else np.zeros_like(self.shafts.gear)
+        lossy = [joint for joint in joints_of(self.way) if not joint.lossless]
+        for joint, sense in zip(lossy, self._sense_radps, strict=True):
+            if not self._drags(joint, sense, terms[:, -1, :-1], gear):
+                return None
+        none = np.zeros(len(gear))
+        acting = np.array([self.shafts.acting_nm.get(shaft, none) for shaft in self.way.shafts])
+        left, right = np.full(torque_nm.shape, np.inf), np.full(torque_nm.shape, -np.inf)
+        for signs, own in zip(directions(self.way), terms, strict=True):
+            agrees = np.ones(torque_nm.shape, dtype=bool)
+            for sign, sense, unknown in zip(signs, self._sense_radps, own, strict=False):
+                passed = np.sum(unknown[:-1, gear] * acting, axis=0)[:, None]
+                passed = passed + unknown[-1, gear][:, None] * torque_nm
+                agrees &= passed * (sign * sense)[:, None] >= -_POWER_W
+                # Where no power can pass, the first direction counts.
+                agrees &= (sense != 0)[:, None] | (sign > 0)
+            slope = own[-1, -1, gear][:, None]
+            left = np.where(agrees, np.minimum(left, slope), left)
+            right = np.where(agrees, np.maximum(right, slope), right)
+        return left, right
+
+    def _drags(self, joint: Joint, sense: Array, on_shafts: Array, gear: Indices) -> bool:
+        """Whether more drag where a joint delivers never takes less of the engine.
+
+        on_shafts: (direction, shaft, gear) what a torque acting on each shaft takes of it
+        """
+        total = np.zeros((len(on_shafts), len(gear)))
+        for place, shaft in enumerate(self.way.shafts):
+            if shaft in joint.reaction:
+                total = total + self.shafts.at(joint.reaction[shaft][1]) * on_shafts[:, place, gear]
+        return bool((np.sign(sense) * total >= -_NOTHING).all())
 
     def sense_radps(self, joint: Joint) -> Array:
         """(state,) speed that times the joint's lambda is the power that enters it."""

@@ -13,9 +13,11 @@ import numpy as np
 
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.cells import Cells, Figures
 from hevopt.problem.flows import Flows
+from hevopt.problem.given import MODES_MAX
 from hevopt.problem.problem import Problem
-from hevopt.problem.table import MODES_MAX, ControlTable
+from hevopt.problem.table import ControlTable
 
 # A dwell is over when no more than this share of it is missing.
 _ROUNDING = 1e-9
@@ -40,6 +42,12 @@ class RepeatedFlows(Flows):
 
     def along(self, control: Indices) -> dict[str, Array]:
         return self.flows.along(self.columns[control])
+
+    def cells(self, figures: Figures) -> Cells | None:
+        times = np.bincount(self.columns)
+        first = np.cumsum(times) - times
+        found = self.flows.cells(figures.columns(first))
+        return None if found is None else found.repeated(first, times)
 
 
 def with_dwell(problem: Problem, least_on_s: float, least_off_s: float) -> Problem:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.cells import Cells, Figures
 from hevopt.problem.frozen import frozen
 
 
@@ -18,6 +19,10 @@ class Flows(Mapping[str, Array], Shown):
 
     def _facts(self) -> dict[str, object]:
         return {"flows": list(self)}
+
+    def cells(self, figures: Figures) -> Cells | None:
+        """What is known between neighbours of the table whose flows these are; None where nothing is."""
+        return None
 
     @abstractmethod
     def along(self, control: Indices) -> dict[str, Array]:

@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.cells import BETWEEN, Between, Cells, Figures, cells_between
 from hevopt.problem.flows import Flows, GivenFlows
 from hevopt.problem.frozen import frozen
+from hevopt.problem.given import no_switching, one_per_step
 from hevopt.problem.reject import REJECT_WORDS, Reject
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-MODES_MAX = 1000
 _SWITCHING = ("switch_fuel_kg", "switch_allowed", "switch_energy_j")
 
 
@@ -60,6 +61,7 @@ class ControlTable(Shown):
     mode); the energy is taken from what the battery stores, before the step, > 0 where going there takes some
     flows: name -> (time, control) powers, speeds and torques for the energy balance; may be empty
     missing_torque_nm: (time,) wheel torque that no control could deliver and that was left undriven
+    between: what is declared of cost over battery power between neighbouring controls, see `from_arrays`
     """
 
     time_s: Array
@@ -76,6 +78,7 @@ class ControlTable(Shown):
     flows: Mapping[str, Array] = field(default_factory=dict)
     missing_torque_nm: Array | None = None
     switch_energy_j: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    between: Between = ""
 
     @classmethod
     def from_arrays(
@@ -90,6 +93,7 @@ class ControlTable(Shown):
         switch_fuel_kg: Array | None = None,
         switch_allowed: Flags | None = None,
         switch_energy_j: Array | None = None,
+        between: Between = "",
     ) -> "ControlTable":
         """A table from (time, control) arrays alone: any cost in kg, battery power, and what can be used.
 
@@ -98,7 +102,10 @@ class ControlTable(Shown):
         Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is
         one, and nothing costs to switch; with it, `switch_fuel_kg` and `switch_energy_j` are (mode, mode) or (time,
         mode, mode), by default 0.
-        Raises DataError where shapes do not agree or usable entries are not finite.
+        between: what is known between neighbours, usable controls of one step and mode next to each other in
+        battery power: with "convex" fuel and NOx are convex functions of that power, with "linear" straight lines
+        from neighbour to neighbour; a certificate then speaks of all that lies between, else of these controls.
+        Raises DataError where shapes do not agree, usable entries are not finite or contradict `between`.
         """
         fuel, power = frozen("fuel_kg", fuel_kg), frozen("battery_power_w", battery_power_w)
         if fuel.ndim != 2 or power.shape != fuel.shape or not fuel.size:
@@ -110,12 +117,12 @@ class ControlTable(Shown):
         nox = np.zeros_like(fuel) if nox_kg is None else frozen("nox_kg", nox_kg)
         if usable.shape != fuel.shape or nox.shape != fuel.shape:
             raise DataError(f"feasible and nox_kg must have the shape of fuel_kg, {fuel.shape}")
-        steps = _one_per_step(step_s, fuel.shape[:1])
+        steps = one_per_step(step_s, fuel.shape[:1])
         modes = frozen("mode", np.zeros(fuel.shape[1]) if mode is None else mode, np.int64)
-        switch = _no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
+        switch = no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
         switch = frozen("switch_fuel_kg", switch)
         allowed = np.ones(switch.shape[-2:], np.bool_) if switch_allowed is None else switch_allowed
-        return cls(
+        table = cls(
             time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
             step_s=steps,
             fuel_kg=np.where(usable, fuel, 0.0),
@@ -127,7 +134,24 @@ class ControlTable(Shown):
             switch_allowed=allowed,
             controls=tuple(Control(True, 0, str(c)) for c in range(fuel.shape[1])),
             switch_energy_j=np.zeros((0, 0)) if switch_energy_j is None else switch_energy_j,
+            between=between,
         )
+        table.cells()
+        return table
+
+    def cells(self) -> Cells | None:
+        """What is known between neighbouring controls; DataError where what is declared contradicts them."""
+        figures = Figures(
+            self.fuel_kg, self.nox_kg, self.battery_power_w, self.feasible, self.step_s
+        )
+        if not self.between:
+            assert isinstance(self.flows, Flows)  # made so in __post_init__
+            return self.flows.cells(figures)
+        # What the battery alone refuses still tells how its neighbours go on.
+        given = (self.reject & ~np.uint16(Reject.BATTERY_LIMIT)) == 0
+        cells = cells_between(self.between, *figures[:3], given, self.mode)
+        usable = figures.usable
+        return cells.kept(usable[cells.step, cells.low] & usable[cells.step, cells.high])
 
     def __post_init__(self) -> None:
         types = {"reject": np.uint16, "mode": np.int64, "switch_allowed": np.bool_}
@@ -193,6 +217,10 @@ class ControlTable(Shown):
                     f"control table: {name} holds NaN or infinite values; give any finite value "
                     "and mark the entry in reject or switch_allowed"
                 )
+        if self.between not in BETWEEN:
+            raise DataError(
+                f"control table: between is {self.between!r}; allowed: 'convex', 'linear', or '' for nothing known"
+            )
         if (self.step_s <= 0).any():
             raise DataError("control table: every step_s must be > 0")
         if self.mode.min() < 0 or self.mode.max() >= self.modes:
@@ -262,26 +290,12 @@ class ControlTable(Shown):
 def _freeze(parts: Signals | ControlTable, types: Mapping[str, type], place: str) -> None:
     """Put arrays that cannot be changed in the place of those given: of float64 but for the types named."""
     for part in fields(parts):
-        if part.name in ("controls", "signals", "flows") or getattr(parts, part.name) is None:
+        if (
+            part.name in ("controls", "signals", "flows", "between")
+            or getattr(parts, part.name) is None
+        ):
             continue
         values = frozen(
             place + part.name, getattr(parts, part.name), types.get(part.name, np.float64)
         )
         object.__setattr__(parts, part.name, values)
-
-
-def _one_per_step(step_s: float | Array, shape: tuple[int, ...]) -> Array:
-    steps = frozen("step_s", step_s)
-    if steps.shape not in ((), (1,), shape):
-        raise DataError(
-            f"step_s has shape {steps.shape}; allowed: one number, or one per step, {shape}"
-        )
-    return np.broadcast_to(steps, shape)
-
-
-def _no_switching(modes: Indices) -> Array:
-    """(mode, mode) of 0 for every mode that stands in the list."""
-    highest = int(modes.max(initial=0))
-    if not 0 <= highest < MODES_MAX:
-        raise DataError(f"mode runs to {highest}; allowed: 0 to {MODES_MAX - 1}")
-    return np.zeros((highest + 1, highest + 1))

@@ -7,7 +7,7 @@ is charge-corrected: less what the end charge is worth by the multiplier of the 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from hevopt.bounds.certificate import certify
+from hevopt.bounds.prices import one_price_dual
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle, load_cycle
@@ -119,7 +119,7 @@ def under(variation: Variation, cycle: Cycle, cars: Iterable[str] = CARS) -> Und
         car, changed, problem, touched = varied(name, cycle, variation)
         if not touched:
             untouched.add(name)
-        price_kgpj = certify(problem).price_kgpj
+        price_kgpj = one_price_dual(problem)[-1].price_kgpj
         for strategy in _RULES.get(name, _HYBRID_RULES):
             trajectory = simulate(problem, strategy_named(strategy).solve(problem).control)
             fuel_kg, nox_kg = trajectory.total_fuel_kg, trajectory.total_nox_kg

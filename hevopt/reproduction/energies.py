@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.bounds.certificate import certify
+from hevopt.bounds.prices import one_price_dual
 from hevopt.problem.simulation import simulate
 from hevopt.reproduction.variations import Varied, signals_of
 from hevopt.strategies import strategy_named
@@ -50,7 +50,7 @@ def balance(shipped: Varied, rule: str) -> Balance:
         return fuel_kg * car.engine.heating_value_jpkg / cycle.distance_m
 
     work, running = sum_of(np.where(fired, np.maximum(engine_w, 0), 0)), sum_of(fuel_w)
-    worth_kg = certify(problem).price_kgpj * (trajectory.end_j - problem.end_min_j)
+    worth_kg = one_price_dual(problem)[-1].price_kgpj * (trajectory.end_j - problem.end_min_j)
     fuel_kg = trajectory.total_fuel_kg - worth_kg
     return Balance(
         traction=sum_of(np.maximum(wheel_w, 0)),

@@ -98,7 +98,7 @@ def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) ->
         engine_starts=engine_starts(problem, trajectory),
         bound_l_per_100km=None if car.electric else litres(car, cycle, bound_kg),
         gap_percent=_percent(trajectory.cost_kg - bound_kg, abs(bound_kg)),
-        certificate=Claim(proof),
+        certificate=certificate.claim(proof),
         solve_s=solve_s,
     )
 

@@ -1,5 +1,7 @@
 """The attack on the proofs: random problems of the kinds that break them, each against trying every plan.
 
+Bounds on what lies between levels are tried on a finer problem of the same number, see split.py.
+
     python tests/proofs/run.py --count 10000
 
 Problem n is always the same. Exit status 1 and one line per fault where something was wrong.
@@ -14,6 +16,7 @@ if __name__ == "__main__":
 
 from proofs.check import faults_of
 from proofs.draw import draw
+from proofs.split import split_faults
 
 # Strategies that take long are tried on every so many problems.
 _RARE_EVERY = 50
@@ -25,6 +28,7 @@ def attack(problems: range, nodes: int = 1001) -> list[str]:
     for n in problems:
         try:
             found = faults_of(draw(n), every_strategy=n % _RARE_EVERY == 0, nodes=nodes)
+            found += split_faults(n)
         except Exception as error:
             found = [f"{type(error).__name__}: {error}"]
         faults += [f"problem {n}: {fault}" for fault in found]

@@ -79,7 +79,7 @@ def _figures(row: SavedRow) -> dict[str, Any]:
         derived["co2_corrected_g_per_km"] = figures.co2_g_per_km * share
     if figures.soc_end is not None:
         derived["delta_soc"] = figures.soc_end - figures.soc_start
-    proof = "" if figures.certificate is None else str(figures.certificate.proof)
+    proof = "" if figures.certificate is None else str(figures.certificate)
     return figures.model_dump() | derived | {"proof": proof, "solved": row.detail is not None}
 
 

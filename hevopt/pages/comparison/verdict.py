@@ -2,6 +2,7 @@
 
 from math import inf
 
+from hevopt.bounds.certificate import Scope
 from hevopt.pages.comparison.results import Results, RowFigures
 from hevopt.pages.render import fixed
 from hevopt.studies.rows import end_asked_text, marked
@@ -137,10 +138,13 @@ def _second(results: Results, best: RowFigures) -> str:
             return "It cannot be lower: nothing is burnt, and 0 is the bound."
         return "The proven lower bound is 0: how close to it the row could come is not known."
     proof = "" if best.certificate is None else best.certificate.proof
+    scope = "among the tabulated controls"
+    if best.certificate is not None and best.certificate.scope == Scope.CONTINUOUS:
+        scope = "at or between the levels of its torques"
     sum_of = " of that sum" if results.nox_weight else ""
     return (
         f"As driven it lies {max(best.gap_percent, 0.0):.3f}{_PERCENT} above a proven lower bound ({proof}): no "
-        f"use of engine, machine and gears among the tabulated controls takes {best.architecture} below "
+        f"use of engine, machine and gears {scope} takes {best.architecture} below "
         f"{best.bound_l_per_100km:.4f}{_VOLUME}{sum_of} with the same charge at the end."
     )
 

@@ -8,8 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from hevopt.bounds.certificate import Certificate, Claim, Proof
-from hevopt.bounds.prices import one_price_dual
+from hevopt.bounds.certificate import certify
 from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle, load_cycle
@@ -108,15 +107,14 @@ class _Bench:
 
 def _bound_row(car: Architecture, cycle: Cycle, problem: Problem) -> dict[str, Any]:
     """The certified dual alone: what no plan that ends with the asked charge can undercut."""
-    lines = list(one_price_dual(problem))
-    certificate = Certificate(problem.end_min_j, {Proof.ONE_MULTIPLIER: lines})
+    certificate = certify(problem)
     bound_kg, proof = certificate.bound_kg(problem.end_min_j)
     row = Row(
         car.name,
         BOUND,
         Status(shortfall_steps=shortfall_steps(problem)),
         bound_l_per_100km=litres(car, cycle, bound_kg),
-        certificate=Claim(proof),
+        certificate=certificate.claim(proof),
     )
     return _stored(row, None, row.bound_l_per_100km)
 
