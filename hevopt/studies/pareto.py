@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite
 
-from hevopt.bounds.certificate import Proof, certify
+from hevopt.bounds.certificate import Claim, certify
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.problem import Plan, Problem
@@ -43,7 +43,7 @@ class HalfPlane:
 
     nox_weight: float
     bound_kg: float
-    proof: Proof
+    proof: Claim
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +138,7 @@ def _solved(problem: Problem, solve: Callable[[Problem], Plan]) -> tuple[Point, 
     bound_kg, proof = certificate.bound_kg(problem.end_min_j)
     weight = problem.nox_weight
     point = Point((weight,), trajectory.total_fuel_kg, trajectory.total_nox_kg)
-    return point, HalfPlane(weight, float(bound_kg), proof)
+    return point, HalfPlane(weight, float(bound_kg), certificate.claim(proof))
 
 
 def _front(solved: Sequence[tuple[Point, HalfPlane]]) -> Front:
