@@ -65,8 +65,8 @@ def front_notes(front: CarFront, car: Architecture, *, refined: bool) -> str:
     if refined:
         short += "\nrefined: one table for all weights, torque levels added around the plan of least fuel."
     return f"""weight: kg of fuel that a kg of NOx counts, first to last of those for which no plan found is better.
-bound: no plan of the scope that stands with its proof and ends with a state of charge of {car.soc_end:g} or more has
-less fuel + weight x NOx, as fuel volume. Each bound is a half plane of the diagram; no plan lies beyond any of them.
+bound: no plan of its scope that ends with a state of charge of {car.soc_end:g} or more has less
+fuel + weight x NOx, as fuel volume. Each bound is a half plane of the diagram; no plan lies beyond any of them.
 gap: the point's own sum above its bound; charge left beyond what is asked is not credited.
 {len(weights)} weights from {weights[0]:g} to {weights[-1]:.4g}: for any of them or between, the best point is
 within {front.gap_percent:.3f} % of the least that the bounds leave.{short}"""

@@ -89,6 +89,7 @@ def test_no_torque_costs_less_than_its_cells_points_at_any_price_and_charge(betw
     assert worst_below(*between, weight) <= 0
 
 
+@pytest.mark.parametrize("between", ["C2", "D", "E"], indirect=True)
 def test_points_two_watts_too_high_would_be_noticed(between):
     assert worst_below(*between, 0.0, lower=2.0) > 1e-9
 

@@ -28,11 +28,12 @@ def drawn(seed: int) -> tuple[Problem, Problem]:
     coarse = np.array([0, 2, 4]) if rng.random() < 0.5 else np.array([0, 1, 4])
     switch = base.table.switch_fuel_kg[..., :1, :1] * (1 - np.eye(modes))
 
-    def problem(which, between):
+    def problem(which, between, usable=None):
         flat = (steps, modes * len(which))
         table = ControlTable.from_arrays(
             fuel[..., which].reshape(flat),
             (power[..., which] * reach).reshape(flat),
+            None if usable is None else usable.reshape(flat),
             step_s=base.table.step_s[:steps],
             nox_kg=nox[..., which].reshape(flat),
             mode=np.repeat(np.arange(modes), len(which)),
@@ -41,7 +42,12 @@ def drawn(seed: int) -> tuple[Problem, Problem]:
         )
         return Problem(table, base.battery, base.soc_start, base.soc_end_min, 0, base.nox_weight)
 
-    return problem(coarse, "convex"), problem(np.arange(5), "")
+    one = problem(coarse, "convex")
+    # What the battery refuses of the coarse table ends what is spoken of.
+    open_ = one.table.feasible.reshape(steps, modes, 3)
+    low = np.where(open_, power[..., coarse], np.inf).min(axis=-1, keepdims=True)
+    high = np.where(open_, power[..., coarse], -np.inf).max(axis=-1, keepdims=True)
+    return one, problem(np.arange(5), "", (power >= low) & (power <= high))
 
 
 def _convex(rng, power, shape):
