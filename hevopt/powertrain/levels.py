@@ -56,12 +56,10 @@ def labels(follows_load: bool, state: State, levels: int, around: Around | None)
     """The names of a state's levels."""
     if follows_load:
         return ("battery idle",)
-    shares = _shares(state, levels)
-    named = tuple(f"{share:.3f}" for share in shares)
-    if not state.engine_on:
-        return named
+    named = tuple(f"{share:.3f}" for share in _shares(state, levels))
+    special = _SPECIAL_LEVELS if state.engine_on else ()
     added = () if around is None else tuple(f"refined {place:+.2f}" for place in ADDED_PLACES)
-    return (*named, *_SPECIAL_LEVELS, *added)
+    return (*named, *special, *added)
 
 
 def levels_of(here: Setting, state: State, levels: int, around: Around | None) -> Levels:
@@ -82,9 +80,9 @@ def levels_of(here: Setting, state: State, levels: int, around: Around | None) -
         if not here.way.chosen:
             repeats[:, len(shares) + _SPECIAL_LEVELS.index("best efficiency")] = True
         torque = np.column_stack([torque, np.zeros_like(idle), idle, best, cut])
-        if around is not None:
-            added = around.added_nm(state, here.shafts.step, low, high)
-            torque = np.column_stack([torque, added])
+    if around is not None:
+        added = around.added_nm(state, here.shafts.step, low, high)
+        torque = np.column_stack([torque, added])
     repeats[high - low <= _TORQUE_TOLERANCE_NM, 1:] = True
     return Levels({name: torque}, repeats)
 

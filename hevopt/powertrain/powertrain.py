@@ -45,7 +45,7 @@ def build_problem(
     """The energy-management problem of a car on a cycle, charge at the end no less than the car's `soc_end`.
 
     levels: machine torques per step and joint; nox_weight: kg of fuel that a kg of NOx counts;
-    around: where to add controls with the engine on, see `around_plan`.
+    around: where to add controls, see `around_plan`.
     Raises InfeasibleError, listing steps and missing torque, where no control follows the cycle; with
     `allow_shortfall` such steps are driven with what the powertrain can give, and marked in the table.
     """

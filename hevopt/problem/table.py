@@ -61,7 +61,9 @@ class ControlTable(Shown):
     mode); the energy is taken from what the battery stores, before the step, > 0 where going there takes some
     flows: name -> (time, control) powers, speeds and torques for the energy balance; may be empty
     missing_torque_nm: (time,) wheel torque that no control could deliver and that was left undriven
-    between: what is declared of cost over battery power between neighbouring controls, see `from_arrays`
+    between: what is known between neighbours, usable controls of one step and mode next to each other in battery
+    power: "convex" where fuel and NOx are convex functions of that power, "linear" where they are straight lines
+    from neighbour to neighbour; a certificate then speaks of all that lies between, else of these controls alone
     """
 
     time_s: Array
@@ -102,9 +104,6 @@ class ControlTable(Shown):
         Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is
         one, and nothing costs to switch; with it, `switch_fuel_kg` and `switch_energy_j` are (mode, mode) or (time,
         mode, mode), by default 0.
-        between: what is known between neighbours, usable controls of one step and mode next to each other in
-        battery power: with "convex" fuel and NOx are convex functions of that power, with "linear" straight lines
-        from neighbour to neighbour; a certificate then speaks of all that lies between, else of these controls.
         Raises DataError where shapes do not agree, usable entries are not finite or contradict `between`.
         """
         fuel, power = frozen("fuel_kg", fuel_kg), frozen("battery_power_w", battery_power_w)
@@ -122,7 +121,7 @@ class ControlTable(Shown):
         switch = no_switching(modes) if switch_fuel_kg is None else switch_fuel_kg
         switch = frozen("switch_fuel_kg", switch)
         allowed = np.ones(switch.shape[-2:], np.bool_) if switch_allowed is None else switch_allowed
-        table = cls(
+        return cls(
             time_s=np.concatenate([[0.0], np.cumsum(steps)[:-1]]),
             step_s=steps,
             fuel_kg=np.where(usable, fuel, 0.0),
@@ -136,8 +135,6 @@ class ControlTable(Shown):
             switch_energy_j=np.zeros((0, 0)) if switch_energy_j is None else switch_energy_j,
             between=between,
         )
-        table.cells()
-        return table
 
     def cells(self) -> Cells | None:
         """What is known between neighbouring controls; DataError where what is declared contradicts them."""
@@ -164,6 +161,8 @@ class ControlTable(Shown):
         object.__setattr__(self, "controls", tuple(self.controls))
         self._check_shapes()
         self._check_values()
+        if self.between:
+            self.cells()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made by the constructor, so that they cannot be changed either."""
