@@ -116,15 +116,18 @@ def _virtual_of(problem: Problem) -> Virtual | None:
     cells = problem.table.cells()
     if cells is None:
         return None
-    cost = cells.fuel_kg
-    if problem.nox_weight != 0:
-        cost = cost + problem.nox_weight * cells.nox_kg
+    table = problem.table
+    whole = table.fuel_kg, table.nox_kg, table.battery_power_w * table.step_s[:, None]
+    if not np.allclose(_cost_kg(problem, *whole), problem.cost_kg, rtol=1e-12, atol=0.0):
+        return None  # an objective of which the lines know nothing
+    energy_j = cells.power_w * table.step_s[cells.step]
+    cost = _cost_kg(problem, cells.fuel_kg, cells.nox_kg, energy_j)
     nodes_kg, nodes_w, needed = nodes_of(cost, cells.power_w, Worst.of(problem.battery))
     for n, column in ((0, cells.low), (3, cells.high)):
         at = cells.step, column
         below = nodes_kg[n] < problem.cost_kg[at]
-        below |= nodes_w[n] < problem.table.battery_power_w[at]
-        needed[n] &= below | (problem.table.reject[at] != 0)
+        below |= nodes_w[n] < table.battery_power_w[at]
+        needed[n] &= below | (table.reject[at] != 0)
     entry, cell = np.nonzero(needed)
     return Virtual(
         cells.step[cell],
@@ -133,6 +136,16 @@ def _virtual_of(problem: Problem) -> Virtual | None:
         nodes_w[entry, cell],
         cells.slack_kg * (1.0 + problem.nox_weight),
     )
+
+
+def _cost_kg(problem: Problem, fuel_kg: Array, nox_kg: Array, energy_j: Array) -> Array:
+    """What fuel, NOx and energy at the terminals count; of lines below each a line below their sum."""
+    cost_kg = fuel_kg
+    if problem.nox_weight != 0:
+        cost_kg = cost_kg + problem.nox_weight * nox_kg
+    if problem.electricity_kgpj != 0:
+        cost_kg = cost_kg + problem.electricity_kgpj * energy_j
+    return cost_kg
 
 
 def nodes_of(cost: Array, power: Array, worst: Worst) -> tuple[Array, Array, Flags]:

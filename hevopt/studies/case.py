@@ -20,6 +20,9 @@ from hevopt.units import litres_per_100km
 # Levels are added until the cost moves by less than this share.
 _REFINED_ENOUGH = 2e-4
 _REFINEMENTS_MAX = 8
+# Gaps within which a plan counts as found, of a table of levels and of one with levels added. A bound on all that
+# lies between the levels is a little lower than the table's own, and is to stay within its target.
+_ENOUGH, _ENOUGH_REFINED = 0.6 * TARGET_GAP, 0.1 * TARGET_GAP
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -68,7 +71,8 @@ def prepare(
             allow_shortfall=settings.allow_shortfall,
             around=around,
         )
-        return dp_case(car, cycle, problem)
+        enough = _ENOUGH if around is None else _ENOUGH_REFINED
+        return dp_case(car, cycle, problem, enough_gap=enough)
 
     if nox_weight > 0:
         require_nox(car, f"nox_weight {nox_weight:g}")
@@ -101,11 +105,18 @@ def require_nox(car: Architecture, asking: str) -> None:
 
 
 def dp_case(
-    car: Architecture, cycle: Cycle, problem: Problem, target_gap: float = TARGET_GAP
+    car: Architecture,
+    cycle: Cycle,
+    problem: Problem,
+    target_gap: float = TARGET_GAP,
+    enough_gap: float = _ENOUGH,
 ) -> Case:
-    """A problem of a car on a cycle, solved by dynamic programming and certified along its rollout."""
+    """A problem of a car on a cycle, solved by dynamic programming and certified along its rollout.
+
+    enough_gap: within which of the table's optimum a plan of few grids is taken
+    """
     began = perf_counter()
-    plan = dp.solve(problem, enough_gap=TARGET_GAP)
+    plan = dp.solve(problem, enough_gap=enough_gap)
     trajectory = simulate(problem, plan.control)
     dp_s = perf_counter() - began
     certificate = certify(problem, trajectory, target_gap=target_gap)

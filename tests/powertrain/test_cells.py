@@ -118,6 +118,19 @@ def test_a_car_whose_parts_show_no_convexity_is_certified_by_its_levels():
     assert build_problem(car, part("nedc", 110, 130)).table.cells() is None
 
 
+def test_what_electricity_counts_is_counted_between_levels_too():
+    problem = build_problem(load_architecture("C2"), part("nedc", 110, 150))
+    priced = replace(problem, electricity_kgpj=4e-8)
+    split, fine = virtual.split_of(priced), virtual.split_of(problem)
+    table, own = problem.table, split.virtual
+    dear = own.cost_kg - 4e-8 * own.power_w * table.step_s[own.step]
+    assert len(own.step) and abs(dear.mean() / fine.virtual.cost_kg.mean() - 1) < 0.1
+    rollout = simulate(priced, solve(priced).control)
+    certificate = certify(priced, rollout)
+    assert certificate.scope is Scope.CONTINUOUS
+    assert 0 <= rollout.cost_kg - certificate.bound_of(rollout)[0] < 1e-3 * rollout.cost_kg
+
+
 def test_cells_of_a_table_that_was_changed_are_not_those_of_the_car():
     table = build_problem(load_architecture("C2"), part("nedc", 110, 130)).table
     assert len(table.cells().step)
