@@ -33,6 +33,8 @@ from hevopt.problem.cells import Cells, Figures, joined
 _TOUCH_NM = 1e-9
 # Share of a step's greatest figure by which a level worked out again may differ from the table's.
 _SAME = 1e-12
+# Powers of so little count as none.
+_ZEROED_W = 4e-9
 
 
 class _Sides(NamedTuple):
@@ -106,8 +108,10 @@ def _cells(levels: _Levels, figures: Figures) -> Cells | None:
     at = step[:, None], levels.column
     length_s = figures.step_s[step][:, None]
     fuel, nox, power = (values[at] for values in figures[:3])
-    battery_w = found.machines_w + here.car.vehicle.auxiliary_power_w
-    if not _same(figures.usable[at], (fuel, found.fuel_kgps * length_s), (power, battery_w)):
+    machines_w = np.broadcast_to(found.machines_w, power.shape)
+    if not _same(figures.usable[at], fuel - found.fuel_kgps * length_s, fuel) or not _same(
+        figures.usable[at], _apart(power - machines_w, figures.usable[at]), power, _ZEROED_W
+    ):
         return None
     power_sides = _power_sides(levels)
     burnt = _burnt(levels, torques.get(ENGINE), found)
@@ -141,12 +145,17 @@ def _cells(levels: _Levels, figures: Figures) -> Cells | None:
     )
 
 
-def _same(usable: Flags, *pairs: tuple[Array, Array]) -> bool:
+def _same(usable: Flags, error: Array, values: Array, slack: float = 0.0) -> bool:
     """Whether levels worked out again are those of the table where they can be used."""
-    return all(
-        (np.abs(again - values) <= _SAME * np.abs(values).max(axis=1, keepdims=True))[usable].all()
-        for values, again in pairs
-    )
+    scale = np.abs(values).max(axis=1, keepdims=True)
+    return bool((np.abs(error) <= _SAME * scale + slack)[usable].all())
+
+
+def _apart(rest: Array, usable: Flags) -> Array:
+    """(state, level) how far the load beside the machines is from that at the state's first usable level."""
+    first = np.argmax(usable, axis=1)[:, None]
+    apart: Array = rest - np.take_along_axis(rest, first, axis=1)
+    return apart
 
 
 def _power_sides(levels: _Levels) -> _Sides | None:
