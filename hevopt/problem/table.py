@@ -100,10 +100,8 @@ class ControlTable(Shown):
         """A table from (time, control) arrays alone: any cost in kg, battery power, and what can be used.
 
         The power is that at the terminals: losses between them and the wheels are in it, those of the battery not.
-
-        Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is
-        one, and nothing costs to switch; with it, `switch_fuel_kg` and `switch_energy_j` are (mode, mode) or (time,
-        mode, mode), by default 0.
+        Where not feasible, fuel and power may be anything, NaN and infinity included. Without `mode` there is one;
+        with it, `switch_fuel_kg` and `switch_energy_j` are (mode, mode) or (time, mode, mode), by default 0.
         Raises DataError where shapes do not agree, usable entries are not finite or contradict `between`.
         """
         fuel, power = frozen("fuel_kg", fuel_kg), frozen("battery_power_w", battery_power_w)
