@@ -28,7 +28,7 @@ from hevopt.car.slopes import cut_nm, fuel_slopes, loss_slopes, nox_bend, nox_sl
 from hevopt.powertrain.branches import Driven, Piece
 from hevopt.powertrain.operation import Flowing, Setting, completed, flowing, setting
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.cells import Cells, Figures, joined
+from hevopt.problem.cells import SplitCells, TableFigures, joined
 
 _TOUCH_NM = 1e-9
 # Share of a step's greatest figure by which a level worked out again may differ from the table's.
@@ -57,7 +57,7 @@ class _Levels(NamedTuple):
     open: Flags
 
 
-def cells_of(branches: Sequence[Driven], figures: Figures) -> Cells | None:
+def cells_of(branches: Sequence[Driven], figures: TableFigures) -> SplitCells | None:
     """The cells of a table that the branches made; None where a part of it is not shown to be convex."""
     widths = [len(branch.labels) for branch in branches]
     steps, columns = figures.fuel_kg.shape
@@ -79,7 +79,7 @@ def cells_of(branches: Sequence[Driven], figures: Figures) -> Cells | None:
     return joined(parts, steps)
 
 
-def _levels(piece: Piece, first: int, figures: Figures) -> _Levels | None:
+def _levels(piece: Piece, first: int, figures: TableFigures) -> _Levels | None:
     """The levels at the states of a piece that have more than one to choose; None where no state has."""
     if not piece.given:
         return None
@@ -99,7 +99,7 @@ def _levels(piece: Piece, first: int, figures: Figures) -> _Levels | None:
     return _Levels(here, name, torque, first + order, begins)
 
 
-def _cells(levels: _Levels, figures: Figures) -> Cells | None:
+def _cells(levels: _Levels, figures: TableFigures) -> SplitCells | None:
     here, name, torque = levels.here, levels.name, levels.torque_nm
     if set(here.machines) != {name}:
         return None
@@ -134,7 +134,7 @@ def _cells(levels: _Levels, figures: Figures) -> Cells | None:
     nox_lines = np.where(flat, 0.0, nox_lines)
     slack = np.zeros(len(figures.step_s))
     np.maximum.at(slack, step, np.max(burnt.slack * length_s, axis=1))
-    return Cells(
+    return SplitCells(
         step[state],
         levels.column[state, low],
         levels.column[state, low + 1],

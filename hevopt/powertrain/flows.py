@@ -17,7 +17,7 @@ from hevopt.powertrain.cells import cells_of
 from hevopt.powertrain.kinetic import jumps_along
 from hevopt.powertrain.operation import Setting, completed, flowing, setting
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.cells import Cells, Figures
+from hevopt.problem.cells import SplitCells, TableFigures
 from hevopt.problem.flows import Flows
 
 _NAMES = (
@@ -67,7 +67,7 @@ class PowerFlows(Flows):
         own = (f"{name}_{what}" for name in self.machines for what in ("torque_nm", "speed_radps"))
         return (*_NAMES, *own)
 
-    def cells(self, figures: Figures) -> Cells | None:
+    def cells(self, figures: TableFigures) -> SplitCells | None:
         return cells_of(self.branches, figures)
 
     def states(self, control: Indices) -> list[State]:

@@ -24,7 +24,7 @@ _EPSILON = 16 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Cells(Shown):
+class SplitCells(Shown):
     """Cells of a table, every end of which is a usable control or lies between two.
 
     step, low, high: (cell,) step, and columns of the controls at the ends, of one mode
@@ -43,9 +43,9 @@ class Cells(Shown):
     def _facts(self) -> dict[str, object]:
         return {"cells": len(self.step), "steps": len(self.slack_kg)}
 
-    def kept(self, mask: Flags) -> "Cells":
+    def kept(self, mask: Flags) -> "SplitCells":
         """The cells where a (cell,) mask holds."""
-        return Cells(
+        return SplitCells(
             self.step[mask],
             self.low[mask],
             self.high[mask],
@@ -53,12 +53,12 @@ class Cells(Shown):
             self.slack_kg,
         )
 
-    def repeated(self, first: Indices, times: Indices) -> "Cells":
+    def repeated(self, first: Indices, times: Indices) -> "SplitCells":
         """The cells of a table in which control c stands times[c] times, from column first[c] on."""
         count = times[self.low]
         which = np.repeat(np.arange(len(self.step)), count)
         number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        return Cells(
+        return SplitCells(
             self.step[which],
             first[self.low[which]] + number,
             first[self.high[which]] + number,
@@ -67,7 +67,7 @@ class Cells(Shown):
         )
 
 
-class Figures(NamedTuple):
+class TableFigures(NamedTuple):
     """What a table says of its controls, (time, control), for those who make cells; step_s: (time,)."""
 
     fuel_kg: Array
@@ -76,19 +76,19 @@ class Figures(NamedTuple):
     usable: Flags
     step_s: Array
 
-    def columns(self, which: Indices) -> "Figures":
+    def columns(self, which: Indices) -> "TableFigures":
         """Those of some controls."""
-        return Figures(
+        return TableFigures(
             *(values[:, which] for values in self[:3]), self.usable[:, which], self.step_s
         )
 
 
-def joined(parts: list[Cells], steps: int) -> Cells:
+def joined(parts: list[SplitCells], steps: int) -> SplitCells:
     """All cells of several parts of a table of as many steps."""
     slack = np.max([part.slack_kg for part in parts], axis=0, initial=0.0)
     if not parts:
         none = np.zeros(0, dtype=np.int64)
-        return Cells(none, none, none, *(np.zeros((2, 2, 0)),) * 3, np.zeros(steps))
+        return SplitCells(none, none, none, *(np.zeros((2, 2, 0)),) * 3, np.zeros(steps))
     step, low, high = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("step", "low", "high")
     )
@@ -96,12 +96,12 @@ def joined(parts: list[Cells], steps: int) -> Cells:
         np.concatenate([getattr(part, name) for part in parts], axis=-1)
         for name in ("fuel_kg", "nox_kg", "power_w")
     )
-    return Cells(step, low, high, fuel, nox, power, slack)
+    return SplitCells(step, low, high, fuel, nox, power, slack)
 
 
 def cells_between(
     between: Between, fuel_kg: Array, nox_kg: Array, power_w: Array, usable: Flags, mode: Indices
-) -> Cells:
+) -> SplitCells:
     """The cells of arrays, (time, control), whose maker knows what lies between neighbours.
 
     Neighbours are usable controls of one step and mode next to each other in battery power, which goes evenly from
@@ -123,7 +123,7 @@ def cells_between(
     chord = np.array([power[pair], power[pair + 1]])
     slack = np.zeros(len(fuel_kg))
     np.maximum.at(slack, step[pair], _rounding_kg(pair, power, quantities))
-    return Cells(step[pair], low, high, *lines, np.array([chord, chord]), slack)
+    return SplitCells(step[pair], low, high, *lines, np.array([chord, chord]), slack)
 
 
 def _lines(between: Between, pair: Indices, power: Array, values: Array) -> Array:

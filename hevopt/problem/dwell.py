@@ -13,7 +13,7 @@ import numpy as np
 
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.cells import Cells, Figures
+from hevopt.problem.cells import SplitCells, TableFigures
 from hevopt.problem.flows import Flows
 from hevopt.problem.given import MODES_MAX
 from hevopt.problem.problem import Problem
@@ -43,7 +43,7 @@ class RepeatedFlows(Flows):
     def along(self, control: Indices) -> dict[str, Array]:
         return self.flows.along(self.columns[control])
 
-    def cells(self, figures: Figures) -> Cells | None:
+    def cells(self, figures: TableFigures) -> SplitCells | None:
         times = np.bincount(self.columns)
         first = np.cumsum(times) - times
         found = self.flows.cells(figures.columns(first))

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.cells import Cells, Figures
+from hevopt.problem.cells import SplitCells, TableFigures
 from hevopt.problem.frozen import frozen
 
 
@@ -20,7 +20,7 @@ class Flows(Mapping[str, Array], Shown):
     def _facts(self) -> dict[str, object]:
         return {"flows": list(self)}
 
-    def cells(self, figures: Figures) -> Cells | None:
+    def cells(self, figures: TableFigures) -> SplitCells | None:
         """What is known between neighbours of the table whose flows these are; None where nothing is."""
         return None
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags, Indices
-from hevopt.problem.cells import BETWEEN, Between, Cells, Figures, cells_between
+from hevopt.problem.cells import BETWEEN, Between, SplitCells, TableFigures, cells_between
 from hevopt.problem.flows import Flows, GivenFlows
 from hevopt.problem.frozen import frozen
 from hevopt.problem.given import no_switching, one_per_step
@@ -134,9 +134,9 @@ class ControlTable(Shown):
             between=between,
         )
 
-    def cells(self) -> Cells | None:
+    def cells(self) -> SplitCells | None:
         """What is known between neighbouring controls; DataError where what is declared contradicts them."""
-        figures = Figures(
+        figures = TableFigures(
             self.fuel_kg, self.nox_kg, self.battery_power_w, self.feasible, self.step_s
         )
         if not self.between:
