@@ -108,7 +108,13 @@ def split_of(problem: Problem) -> Split | None:
     )
     left = choices.control - len(real.control)
     left = np.sort(left[left >= 0])
-    kept = Virtual(*(values[left] for values in virtual[:4]), virtual.slack_kg)
+    kept = Virtual(
+        virtual.step[left],
+        virtual.control[left],
+        virtual.cost_kg[left],
+        virtual.power_w[left],
+        virtual.slack_kg,
+    )
     return Split(kept, choices._replace(control=control[choices.control]))
 
 

@@ -74,7 +74,7 @@ _BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", "z
 _BATTERY_PLACE = 7
 
 
-_SCOPES = {
+_SCOPES: dict[str, str] = {
     Scope.CONTINUOUS: ", every torque between the levels of a joint",
     Scope.TABULATED: ", the levels of a joint alone",
 }

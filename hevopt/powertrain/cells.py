@@ -90,7 +90,8 @@ def _levels(piece: Piece, first: int, figures: TableFigures) -> _Levels | None:
         return None
     torque, usable = torque[some], usable[some]
     order = np.argsort(torque, axis=1, kind="stable")
-    torque, usable = (np.take_along_axis(values, order, axis=1) for values in (torque, usable))
+    torque = np.take_along_axis(torque, order, axis=1)
+    usable = np.take_along_axis(usable, order, axis=1)
     open_ = np.maximum.accumulate(usable, axis=1)
     open_ &= np.maximum.accumulate(usable[:, ::-1], axis=1)[:, ::-1]
     begins = np.zeros_like(open_)

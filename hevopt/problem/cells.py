@@ -45,26 +45,22 @@ class SplitCells(Shown):
 
     def kept(self, mask: Flags) -> "SplitCells":
         """The cells where a (cell,) mask holds."""
-        return SplitCells(
-            self.step[mask],
-            self.low[mask],
-            self.high[mask],
-            *(lines[..., mask] for lines in (self.fuel_kg, self.nox_kg, self.power_w)),
-            self.slack_kg,
-        )
+        return self._picked(np.flatnonzero(mask), self.low[mask], self.high[mask])
 
     def repeated(self, first: Indices, times: Indices) -> "SplitCells":
         """The cells of a table in which control c stands times[c] times, from column first[c] on."""
         count = times[self.low]
         which = np.repeat(np.arange(len(self.step)), count)
         number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        return SplitCells(
-            self.step[which],
-            first[self.low[which]] + number,
-            first[self.high[which]] + number,
-            *(lines[..., which] for lines in (self.fuel_kg, self.nox_kg, self.power_w)),
-            self.slack_kg,
+        return self._picked(
+            which, first[self.low[which]] + number, first[self.high[which]] + number
         )
+
+    def _picked(self, which: Indices, low: Indices, high: Indices) -> "SplitCells":
+        fuel, nox, power = (
+            lines[..., which] for lines in (self.fuel_kg, self.nox_kg, self.power_w)
+        )
+        return SplitCells(self.step[which], low, high, fuel, nox, power, self.slack_kg)
 
 
 class TableFigures(NamedTuple):
@@ -78,17 +74,16 @@ class TableFigures(NamedTuple):
 
     def columns(self, which: Indices) -> "TableFigures":
         """Those of some controls."""
-        return TableFigures(
-            *(values[:, which] for values in self[:3]), self.usable[:, which], self.step_s
-        )
+        fuel, nox, power = (values[:, which] for values in self[:3])
+        return TableFigures(fuel, nox, power, self.usable[:, which], self.step_s)
 
 
 def joined(parts: list[SplitCells], steps: int) -> SplitCells:
     """All cells of several parts of a table of as many steps."""
     slack = np.max([part.slack_kg for part in parts], axis=0, initial=0.0)
     if not parts:
-        none = np.zeros(0, dtype=np.int64)
-        return SplitCells(none, none, none, *(np.zeros((2, 2, 0)),) * 3, np.zeros(steps))
+        none, lines = np.zeros(0, dtype=np.int64), np.zeros((2, 2, 0))
+        return SplitCells(none, none, none, lines, lines, lines, np.zeros(steps))
     step, low, high = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("step", "low", "high")
     )
@@ -119,11 +114,11 @@ def cells_between(
     quantities = [values[step, control] for values in (fuel_kg, nox_kg)]
     if between == "convex":
         _check_convex(step, control, power, pair, quantities)
-    lines = [_lines(between, pair, power, values) for values in quantities]
+    fuel, nox = (_lines(between, pair, power, values) for values in quantities)
     chord = np.array([power[pair], power[pair + 1]])
     slack = np.zeros(len(fuel_kg))
     np.maximum.at(slack, step[pair], _rounding_kg(pair, power, quantities))
-    return SplitCells(step[pair], low, high, *lines, np.array([chord, chord]), slack)
+    return SplitCells(step[pair], low, high, fuel, nox, np.array([chord, chord]), slack)
 
 
 def _lines(between: Between, pair: Indices, power: Array, values: Array) -> Array:
@@ -151,11 +146,9 @@ def _rounding_kg(pair: Indices, power: Array, quantities: list[Array]) -> Array:
     ratio = np.ones(len(pair))
     for near in (np.maximum(place - 1, 0), np.minimum(place + 1, len(pair) - 1)):
         ratio += width / width[near]
-    return (
-        _EPSILON
-        * ratio
-        * np.max([np.abs(v[pair]) + np.abs(v[pair + 1]) for v in quantities], axis=0)
-    )
+    most = np.max([np.abs(v[pair]) + np.abs(v[pair + 1]) for v in quantities], axis=0)
+    rounding_kg: Array = _EPSILON * ratio * most
+    return rounding_kg
 
 
 def _check_apart(step: Indices, control: Indices, power: Array, pair: Indices) -> None:

@@ -61,8 +61,8 @@ class ControlTable(Shown):
     mode); the energy is taken from what the battery stores, before the step, > 0 where going there takes some
     flows: name -> (time, control) powers, speeds and torques for the energy balance; may be empty
     missing_torque_nm: (time,) wheel torque that no control could deliver and that was left undriven
-    between: what is known between neighbours, usable controls of one step and mode next to each other in battery
-    power: "convex" where fuel and NOx are convex functions of that power, "linear" where they are straight lines
+    between: what is known between neighbours, usable controls of one step and mode next to each other by their
+    power, "convex" where fuel and NOx are convex functions of battery power, "linear" where they are straight lines
     from neighbour to neighbour; a certificate then speaks of all that lies between, else of these controls alone
     """
 
