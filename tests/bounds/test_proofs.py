@@ -267,7 +267,7 @@ def test_a_rung_that_fails_is_named(monkeypatch):
     problem = draw_solvable()
     rollout = simulate(problem, dp.solve(problem).control)
 
-    def stopped(problem, rollout):
+    def stopped(*_):
         raise SolverError("HiGHS stopped with status 4")
 
     monkeypatch.setattr(certificate_module, "lp_dual", stopped)

@@ -196,7 +196,7 @@ def test_a_proof_that_was_not_found_is_named_in_json_and_below_the_table(hevopt,
     from hevopt import SolverError
     from hevopt.bounds import certificate
 
-    def stopped(problem, rollout):
+    def stopped(*_):
         raise SolverError("HiGHS stopped with status 4")
 
     words = ("run", "C2", "--cycle", "./short.csv")
