@@ -85,7 +85,7 @@ def test_the_enumeration_has_no_part_of_the_battery_from_hevopt():
     assert "hevopt" not in source.split('"""', 2)[2]
 
 
-@pytest.mark.parametrize(("cycle", "gap"), [("nedc", 0.0109), ("wltc_class3b", 0.0038)])
+@pytest.mark.parametrize(("cycle", "gap"), [("nedc", 0.0201), ("wltc_class3b", 0.0140)])
 def test_a_curve_with_a_knee_at_the_windows_top_is_proven_as_without_it(cycle, gap):
     knee = {
         "battery.curve_soc": [0, 0.4, 0.8, 1],
@@ -241,7 +241,7 @@ def test_every_rung_is_held_against_the_plan_in_hand(monkeypatch):
     problem = draw_solvable()
     rollout = simulate(problem, dp.solve(problem).control)
 
-    def too_high(problem, rollout):
+    def too_high(problem, rollout, choices):
         return [Line(1.0, rollout.cost_kg + 1.0, 0.0, 0.0)]
 
     for rung in ("costate_dual", "lp_dual"):
