@@ -22,7 +22,7 @@ def test_json_has_the_promised_keys_in_order(monkeypatch, capsys):
     status, out, _ = call(monkeypatch, capsys, "compare", "--architectures", "A,C2", "--json")
     assert status == 0
     result = json.loads(out)
-    assert list(result) == ["cycle", "rows", "inputs", "versions", "settings"]
+    assert list(result) == ["cycle", "rows", "causal", "inputs", "versions", "settings"]
     promised = KEYS.replace("\n", " ").replace(" ", "").split(",")
     assert list(Row.__dataclass_fields__) == promised
     assert all(list(row) == promised for row in result["rows"])
