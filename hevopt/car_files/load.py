@@ -48,7 +48,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     contents = with_changes(read_contents(path), own)
     data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
-    files_of: dict[str, FileModel] = {}
+    files_of, places = dict[str, FileModel](), dict[str, str]()
 
     def part(key: str, model: type[Model], build: Callable[[Model], Built]) -> Built | None:
         if getattr(data, key) is None:
@@ -56,7 +56,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
                 raise DataError(_not_there(path, key, of_parts[key]))
             return None
         found = component_contents(path, key, getattr(data, key), of_parts[key])
-        contents[key] = found.contents
+        contents[key], places[key] = found.contents, found.place
         files.append(found.file)
         files_of[key] = file = checked(found.place, found.contents, model)
         return _built(found.place, build, file)
@@ -73,7 +73,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     assert pack is not None and bare is not None
     battery, soc = pack
     car = Architecture(
-        data.name, data.description, _built(f"{path}, car", bare, data.hybrid_mass_kg + more_kg),
+        data.name, data.description, _built(places["car"], bare, data.hybrid_mass_kg + more_kg),
         engine or no_engine(), gearbox, tuple(placed.values()), battery,
         soc_start=soc.start,
         soc_end=soc.start if soc.end is None else soc.end,

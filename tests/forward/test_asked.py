@@ -44,7 +44,9 @@ def test_a_strategy_that_decides_on_the_way_drives_like_its_backward_twin(urban,
     run = found.run
     assert found.asked == Asking(1.0 if strategy == "mpc" else 0.5)
     assert run.quality.violations == () and max(run.residual.values()) < 1e-9
-    assert abs(found.change_percent) < 10 and abs(found.charge_error) < 0.01
+    assert abs(found.change_percent) < 10
+    # A rule calibrated for a whole cycle may leave its charge in the loop; then the run is marked.
+    assert abs(found.charge_error) < 0.01 or any("end charge" in str(m) for m in found.marks)
     assert 0 < run.starts <= 2 * found.backward.engine_starts + 2
     assert sum(found.difference_percent.values()) == pytest.approx(found.change_percent, abs=0.2)
 

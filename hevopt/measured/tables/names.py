@@ -35,7 +35,8 @@ def unit_in_cell(text: str) -> str | None:
     inner = text.strip()
     if len(inner) > 1 and inner[0] + inner[-1] in ("[]", "()", "{}"):
         return inner[1:-1].strip() or "-"
-    return inner if not inner or unit_named(inner) else None
+    # Written small, volts and amperes are names: speed, acceleration.
+    return inner if not inner or (unit_named(inner) and inner not in ("v", "a", "k")) else None
 
 
 def unit_in_name(name: str) -> tuple[str | None, str]:

@@ -120,7 +120,7 @@ def _certificates(sweep: Sweep, groups: Sequence[Group]) -> Alert:
         rest = [
             f"Every design lies within {furthest:.3f} % of its bound; loose would be {LOOSE_PERCENT:g} %."
         ]
-    rest += _by_weights(_floors(figures, groups))
+    rest += _by_weights(_floors(figures, groups), groups)
     return Alert(
         "Certificates",
         bool(lines),
@@ -128,15 +128,22 @@ def _certificates(sweep: Sweep, groups: Sequence[Group]) -> Alert:
     )
 
 
-def _by_weights(found: Iterable[tuple[str, str]]) -> list[str]:
-    """(weight, text) as lines, those of the same text as one."""
+def _by_weights(found: Iterable[tuple[str, str]], groups: Sequence[Group]) -> list[str]:
+    """(weight, text) as lines, those of the same text as one; weights are named where one was asked for."""
     weights: dict[str, list[str]] = {}
     for weight, text in found:
         weights.setdefault(text, []).append(weight)
+    if _unweighted(groups):
+        return list(weights)
     return [
         f"NOx weight{'s' if len(of) > 1 else ''} {', '.join(of)}: {text}"
         for text, of in weights.items()
     ]
+
+
+def _unweighted(groups: Sequence[Group]) -> bool:
+    """Whether no weight on NOx was asked for."""
+    return [group.weight for group in groups] == [0.0]
 
 
 def _floors(figures: DesignFigures, groups: Sequence[Group]) -> Iterator[tuple[str, str]]:
@@ -151,7 +158,8 @@ def _floors(figures: DesignFigures, groups: Sequence[Group]) -> Iterator[tuple[s
         bounds = bounds[~figures.short[group.members]]
         rivals = int((bounds < best).sum()) - int(figures.bound[group.ranked[0]] < best)
         unknown = int(np.isnan(bounds).sum())
-        text = "no other design can be better: their bounds lie above the best objective"
+        no = "No" if _unweighted(groups) else "no"
+        text = f"{no} other design can be better: their bounds lie above the best objective"
         if rivals:
             which = "1 other design could be better: its bound lies"
             if rivals > 1:
@@ -162,13 +170,14 @@ def _floors(figures: DesignFigures, groups: Sequence[Group]) -> Iterator[tuple[s
 
 
 def _ranges(figures: DesignFigures, groups: Sequence[Group]) -> Alert:
-    lines = _by_weights(
+    at_edges = (
         (group.label, line)
         for group in groups
         if len(group.ranked) and group.weight is not None and not figures.short[group.ranked[0]]
         for key, values in figures.values.items()
         if key != NOX_WEIGHT and (line := _edge(key, values, int(group.ranked[0])))
     )
+    lines = _by_weights(at_edges, groups)
     nothing = "No best design lies at the end of a parameter's range."
     if groups[0].weight is None:
         nothing = "No design is ranked, so there is none to look at."

@@ -366,7 +366,7 @@ def test_a_units_row_may_hold_units_that_no_table_knows(tmp_path, header, units,
     assert "units row in line 2" in measured.notes and list(measured.lines) == [3, 4]
     strange = measured.columns[2]
     if found[2] == "°C":
-        with pytest.raises(DataError, match="column T: unit '°C' is unknown"):
+        with pytest.raises(DataError, match="column T: unit '°C' is one of celsius"):
             in_si(measured, strange, ("speed",), "--unit speed=UNIT")
 
 

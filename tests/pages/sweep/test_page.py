@@ -341,7 +341,7 @@ def test_loose_bounds_rivals_and_cases_off_balance_are_alerts():
     assert said(sweep, "Charge balance")[1][0] == "1 case: not neutral."
     tight = sweep_of([solved(n, 4.0 + n) for n in range(2)])
     found, lines = said(tight, "Certificates")
-    assert not found and "no other design can be better" in lines[1]
+    assert not found and "No other design can be better" in lines[1]
 
 
 def many(count):
@@ -565,9 +565,7 @@ def test_a_design_that_does_not_follow_the_cycle_is_never_the_best_and_says_so()
     assert groups[0].ranked.tolist() == [2, 1, 3, 0]
     assert verdict(sweep, groups)[0].startswith("Design 2 ")
     # No weight was asked for, so none is shown.
-    assert "NOx weight" not in re.sub(
-        r"<(style|script).*?</\\1>", "", sweep_page(sweep), flags=re.S
-    )
+    assert "NOx weight" not in re.sub(r"<(style|script).*?</\1>", "", sweep_page(sweep), flags=re.S)
     found, lines = said(sweep, "Steps not followed")
     assert found and "2 of 4 designs" in lines[0] and "up to 9 steps (design 0)" in lines[0]
     plane, words = plane_of(sweep.figures, groups)
@@ -575,7 +573,7 @@ def test_a_design_that_does_not_follow_the_cycle_is_never_the_best_and_says_so()
     assert min(plane["edge"]["fuel"]) == pytest.approx(4.0) and any("Crosses" in w for w in words)
     only = sweep_of([short(0, 3.0, 9)])
     assert "No design that follows the cycle has a bound." in sweep_page(only)
-    assert "no solved design follows the cycle" in verdict(only, groups_of(only.figures))[0]
+    assert "No solved design follows the cycle" in verdict(only, groups_of(only.figures))[0]
     assert not said(sweep_of([solved(0, 4.0)]), "Steps not followed")[0]
 
 
