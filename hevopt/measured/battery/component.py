@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from hevopt.car_files.battery import BatteryFile
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.files.keypaths import with_changes
-from hevopt.files.lookup import find
 from hevopt.files.shown import shown
-from hevopt.files.toml import checked, read_toml
+from hevopt.files.toml import checked
 from hevopt.measured.battery.curves import (
     MeasuredCurves,
     at_temperatures,
@@ -23,6 +21,7 @@ from hevopt.measured.battery.curves import (
     the_asked,
 )
 from hevopt.measured.battery.samples import BatteryCurves, read_test
+from hevopt.measured.like import unmeasured
 
 Array = NDArray[np.float64]
 
@@ -89,24 +88,13 @@ def _base(
     path: Path, like: str | None, values: Mapping[str, Any], capacity_ah: float | None
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Every key but the curves, and where each comes from; DataError naming all that are missing."""
-    for key in values:
-        if key.split(".")[0] in _MEASURED:
-            raise DataError(
-                f"--set {shown(key)}: that is what the import writes from the test; leave it out"
-            )
-    base: dict[str, Any] = {"name": path.stem}
-    origins = {"name": "the file's name"}
-    if like is not None:
-        other = read_toml(find("architectures/components", like, ".toml"), BatteryFile)
-        taken = other.model_dump(exclude_none=True)
-        base |= {key: taken[key] for key in _LIKE_KEYS if key in taken}
-        origins |= {key: f"from {like}" for key in _LIKE_KEYS if key in taken and key != "soc"}
-        origins |= {f"soc.{key}": f"from {like}" for key in taken["soc"]}
+    told = {}
     if capacity_ah is not None and "capacity_ah" not in values:
-        base["capacity_ah"] = float(f"{capacity_ah:.6g}")
-        origins["capacity_ah"] = "by current and soc of the test"
-    base = with_changes(base, values)
-    origins |= dict.fromkeys(values, "given")
+        told["capacity_ah"] = float(f"{capacity_ah:.6g}"), "by current and soc of the test"
+    base, origins = unmeasured(
+        path, BatteryFile, like=like, keys=_LIKE_KEYS, values=values, measured=_MEASURED,
+        source="the test", by_key=("soc",), told=told,
+    )  # fmt: skip
     given: Any = base.get("soc")
     window = given if isinstance(given, dict) else {}
     missing = [key for key in ("cells_in_series", "capacity_ah") if key not in base]

@@ -19,6 +19,7 @@ from hevopt.measured.tables.packed_clock import as_clock
 from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import Measured, asked_column, columns_found, read_measured
 from hevopt.measured.tables.units import in_si
+from hevopt.measured.tables.usable import check_rows
 
 Array = NDArray[np.float64]
 
@@ -167,14 +168,8 @@ def _check_values(measured: Measured, values: Mapping[str, Array]) -> None:
     }
     for role, found in values.items():
         low, high, words = allowed.get(role, (-np.inf, np.inf, "a number"))
-        bad = ~(np.isfinite(found) & (found >= low) & (found <= high))
-        if bad.any():
-            k = int(np.argmax(bad))
-            what = f"{role} {found[k]:.4g}" if np.isfinite(found[k]) else f"no {role}"
-            raise DataError(
-                f"{measured.path}, {runs(list(measured.lines[bad]))}: {what}; allowed: {words}; correct the cells "
-                "or delete the rows"
-            )
+        good = np.isfinite(found) & (found >= low) & (found <= high)
+        check_rows(measured, role, found, good, words)
 
 
 def _curves(measured: Measured, values: Mapping[str, Array], notes: list[str]) -> BatteryCurves:

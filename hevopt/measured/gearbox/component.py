@@ -10,12 +10,11 @@ import numpy as np
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.files.keypaths import with_changes
-from hevopt.files.lookup import find
 from hevopt.files.shown import shown
-from hevopt.files.toml import checked, read_toml
+from hevopt.files.toml import checked
 from hevopt.measured.gearbox.grid import MeasuredGear, gear_grids
 from hevopt.measured.gearbox.points import GearPoints, read_gear_points
+from hevopt.measured.like import unmeasured
 from hevopt.units import RPM_PER_RADPS
 
 _MEASURED = ("efficiency", "loss_map")
@@ -71,20 +70,10 @@ def _base(
     path: Path, like: str | None, values: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Every key but the maps, and where each comes from; DataError naming all that are missing."""
-    for key in values:
-        if key.split(".")[0] in _MEASURED:
-            raise DataError(
-                f"--set {shown(key)}: that is what the import writes from the measured points; leave it out"
-            )
-    base: dict[str, Any] = {"name": path.stem}
-    origins = {"name": "the file's name"}
-    if like is not None:
-        other = read_toml(find("architectures/components", like, ".toml"), GearboxFile)
-        taken = other.model_dump(exclude_none=True)
-        base |= {key: taken[key] for key in _LIKE_KEYS if key in taken}
-        origins |= {key: f"from {like}" for key in _LIKE_KEYS if key in taken}
-    base = with_changes(base, values)
-    origins |= dict.fromkeys(values, "given")
+    base, origins = unmeasured(
+        path, GearboxFile, like=like, keys=_LIKE_KEYS, values=values, measured=_MEASURED,
+        source="the measured points",
+    )  # fmt: skip
     missing = [key for key in ("ratios", "final_drive_ratio", "shift_speeds") if key not in base]
     if missing:
         raise DataError(

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import Measured, asked_column, columns_found, read_measured
 from hevopt.measured.tables.units import in_si, numbers_of
+from hevopt.measured.tables.usable import check_rows
 
 Array = NDArray[np.float64]
 
@@ -141,14 +141,7 @@ def _check_values(measured: Measured, values: Mapping[str, Array], gears: int) -
     else:
         checks["loss"] = ((values["loss"] >= 0) | np.isnan(values["loss"]), "0 or more")
     for role, (good, words) in checks.items():
-        bad = ~(good & ~np.isinf(values[role]))
-        if bad.any():
-            k = int(np.argmax(bad))
-            what = f"{role} {values[role][k]:.4g}" if np.isfinite(values[role][k]) else f"no {role}"
-            raise DataError(
-                f"{measured.path}, {runs(list(measured.lines[bad]))}: {what}; allowed: {words}; correct the cells "
-                "or delete the rows"
-            )
+        check_rows(measured, role, values[role], good & ~np.isinf(values[role]), words)
     missing = sorted(set(range(1, gears + 1)) - set(values["gear"].astype(int).tolist()))
     if missing:
         raise DataError(

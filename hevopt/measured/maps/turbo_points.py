@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.clusters import clusters
-from hevopt.measured.tables.rows import runs
 from hevopt.measured.tables.table import (
     Measured,
     asked_column,
@@ -22,6 +21,7 @@ from hevopt.measured.tables.table import (
     read_measured,
 )
 from hevopt.measured.tables.units import in_si
+from hevopt.measured.tables.usable import check_rows
 from hevopt.units import RPM_PER_RADPS
 
 Array = NDArray[np.float64]
@@ -141,14 +141,8 @@ def _check_values(measured: Measured, values: Mapping[str, Array]) -> None:
     }
     for role, found in values.items():
         low, high, words = allowed[role]
-        bad = ~(np.isfinite(found) & (found > low) & (found <= high))
-        if bad.any():
-            k = int(np.argmax(bad))
-            what = f"{role} {found[k]:.4g}" if np.isfinite(found[k]) else f"no {role}"
-            raise DataError(
-                f"{measured.path}, {runs(list(measured.lines[bad]))}: {what}; allowed: {words}; correct the cells "
-                "or delete the rows"
-            )
+        good = np.isfinite(found) & (found > low) & (found <= high)
+        check_rows(measured, role, found, good, words)
 
 
 def _reduced(
