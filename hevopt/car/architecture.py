@@ -84,8 +84,15 @@ class Architecture(Shown):
 
     @property
     def marks(self) -> frozenset[str]:
-        """What strategies may need or not suit: its functions, and "electric" without an engine."""
-        return self.functions | ({"electric"} if self.electric else frozenset())
+        """What strategies may need or not suit: its functions; "electric" without an engine; "free_engine_speed"
+        where the engine has a speed of its own; "series" where it then turns apart from the wheels."""
+        line = self.driveline
+        own = {
+            "electric": self.electric,
+            "free_engine_speed": line.free_engine_speed,
+            "series": line.free_engine_speed and line.engine_apart,
+        }
+        return self.functions | {mark for mark, holds in own.items() if holds}
 
     @property
     def source(self) -> Path:

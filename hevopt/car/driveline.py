@@ -77,6 +77,17 @@ class Driveline:
         return tuple(dict.fromkeys((WHEEL, *own, *placed, *([self.engine] if self.engine else []))))
 
     @property
+    def engine_apart(self) -> bool:
+        """Whether an engine is joined to the wheels by clutches alone, if at all."""
+        if self.engine is None:
+            return False
+        fixed = [set(part.shafts) for part in self.parts if not isinstance(part, Clutch)]
+        reached = {self.engine}
+        for _ in fixed:
+            reached |= {shaft for shafts in fixed if shafts & reached for shaft in shafts}
+        return WHEEL not in reached
+
+    @property
     def boxes(self) -> tuple[Gearbox, ...]:
         """Its gearboxes."""
         return tuple(part for part in self.parts if isinstance(part, Gearbox))

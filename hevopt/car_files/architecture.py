@@ -31,6 +31,29 @@ class RulesFile(FileModel):
     electric_soc: Soc | None = None
     electric_power_w: NotNegative | None = None
     electric_speed_kmh: Annotated[float, Field(ge=0, le=1000)] | None = None
+    engine_on_power_w: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
+    engine_off_power_w: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
+    charge_power_w: NotNegative | None = None
+    reference_soc: Soc | None = None
+    thermostat_on_soc: Soc | None = None
+    thermostat_off_soc: Soc | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        """What starts the engine lies beyond what stops it."""
+        on_w, off_w = self.engine_on_power_w, self.engine_off_power_w
+        if on_w is not None and off_w is not None and off_w > on_w:
+            raise ValueError(
+                f"engine_off_power_w {off_w:g} lies above engine_on_power_w {on_w:g}; the engine stops below the "
+                "power that starts it"
+            )
+        on, off = self.thermostat_on_soc, self.thermostat_off_soc
+        if on is not None and off is not None and on >= off:
+            raise ValueError(
+                f"thermostat_on_soc {on:g} is not below thermostat_off_soc {off:g}; the engine charges from "
+                "the one to the other"
+            )
+        return self
 
 
 class ArchitectureFile(FileModel):

@@ -134,7 +134,8 @@ def _thresholds(data: RulesFile | None) -> Thresholds:
         return OPEN
     kmh = data.electric_speed_kmh
     speed_mps = None if kmh is None else kmh * TO_SI["_kmh"][1]
-    return Thresholds(data.electric_soc, data.electric_power_w, speed_mps)
+    others = data.model_dump(exclude={"electric_soc", "electric_power_w", "electric_speed_kmh"})
+    return Thresholds(data.electric_soc, data.electric_power_w, speed_mps, **others)
 
 
 def _not_there(path: Path, key: str, changes: Mapping[str, Any]) -> str:

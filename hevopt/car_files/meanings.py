@@ -30,6 +30,13 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "electric_soc": ("-", "state of charge above which the car drives electrically"),
         "electric_power_w": ("W", "up to this power at the wheels; above it the engine is on"),
         "electric_speed_kmh": ("km/h", "and up to this speed"),
+        "engine_on_power_w": ("W", "power_follower: asked power, at the wheels and of missing charge, that starts "
+                              "the engine"),
+        "engine_off_power_w": ("W", "and that below which it stops"),
+        "charge_power_w": ("W", "power_follower: power asked for half a window of missing charge"),
+        "reference_soc": ("-", "power_follower: state of charge at which none is missing"),
+        "thermostat_on_soc": ("-", "thermostat: state of charge below which the engine starts to charge"),
+        "thermostat_off_soc": ("-", "and at which it stops"),
     },
     "CouplingFile": {
         "kind": ("", "where the machine sits: none (alternator), belt (on the engine), crankshaft, gearbox "

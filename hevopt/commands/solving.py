@@ -208,6 +208,8 @@ def run(
     calibration = report.calibration_table(plan)
     if calibration is not None:
         show(calibration)
+    if "thresholds" in plan.notes:
+        write(report.thresholds_line(plan.notes["thresholds"]))
     if out is not None:
         write(f"trajectory written to {out}")
 

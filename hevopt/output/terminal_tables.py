@@ -268,6 +268,12 @@ def _or_any(limit: float, digits: int) -> str:
     return f"{limit:.{digits}f}" if isfinite(limit) else "any"
 
 
+def thresholds_line(thresholds: Mapping[str, float]) -> str:
+    """What a rule's calibration took, as the keys of a car's file."""
+    own = ", ".join(f"{key} = {value:.4g}" for key, value in thresholds.items())
+    return f"as keys of [rules] in the car's file: {own}"
+
+
 def calibration_table(plan: Plan) -> Table | None:
     """The calibration curve of a rule-based strategy; None for the others."""
     members: list[Mapping[str, Any]] = plan.notes.get("calibration", [])

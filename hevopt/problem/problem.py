@@ -60,13 +60,12 @@ class Problem(Shown):
                     f"{name} {getattr(self, name):g} lies outside the SOC window; allowed: "
                     f"{low:g} to {high:g}"
                 )
-        if self.thresholds.electric_soc is not None and not (
-            low <= self.thresholds.electric_soc <= high
-        ):
-            raise DataError(
-                f"rules: electric_soc {self.thresholds.electric_soc:g} lies outside the SOC window; allowed: "
-                f"{low:g} to {high:g}, or leave it out to have it calibrated"
-            )
+        for key, soc in self.thresholds.socs.items():
+            if not low <= soc <= high:
+                raise DataError(
+                    f"rules: {key} {soc:g} lies outside the SOC window; allowed: {low:g} to {high:g}, or leave it "
+                    "out to have it calibrated"
+                )
         if not (np.isfinite(self.nox_weight) and 0 <= self.nox_weight <= 1e6):
             raise DataError(f"nox_weight {self.nox_weight}; allowed: 0 to 1e6 kg fuel per kg NOx")
         if not 0 <= self.start_mode < self.table.modes:

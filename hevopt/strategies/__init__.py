@@ -17,8 +17,10 @@ from hevopt.strategies import (
     ecms,
     mpc,
     nox_cut,
+    power_follower,
     sdp,
     start_stop,
+    thermostat,
 )
 from hevopt.strategies.brought import (
     FORMS,
@@ -89,6 +91,20 @@ STRATEGIES: dict[str, Strategy] = {
         _ELECTRIC,
         start=nox_cut.start,
         start_on=nox_cut.start_on,
+    ),
+    "power_follower": Strategy(
+        power_follower.solve,
+        _RULE,
+        _HYBRID | {"free_engine_speed"},
+        start=power_follower.start,
+        start_on=power_follower.start_on,
+    ),
+    "thermostat": Strategy(
+        thermostat.solve,
+        _RULE,
+        _HYBRID | {"series"},
+        start=thermostat.start,
+        start_on=thermostat.start_on,
     ),
     "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
     "dp": Strategy(dp.solve, "whole cycle", _STOP),

@@ -64,7 +64,7 @@ def rule_of(steps: FamilySteps, limits: Array) -> Rule:
 
 @compiled()
 def result_of(
-    rule: Rule, driven: RuleDrive, nox_kg: Array, choices: Choices, span: Span
+    driven: RuleDrive, nox_kg: Array, choices: Choices, span: Span
 ) -> tuple[float, float, float, float]:
     """Cost, NOx, stored energy beyond what must be left, and 1 where the window is kept and no switch forbidden."""
     case, switch_kg, switch_j, allowed = choices.switching
@@ -97,7 +97,7 @@ def judged(
     for n in range(len(limits)):
         rule = rule_of(steps, limits[n])
         driven, _, (hint, _) = neutral_drive(rule, engine, hint, choices, span, battery)
-        found[n] = result_of(rule, driven, steps.nox_kg, choices, span)
+        found[n] = result_of(driven, steps.nox_kg, choices, span)
     return found
 
 
@@ -117,5 +117,5 @@ def screened(
         rule = rule_of(steps, limits[n])
         hint = enough(rule, engine, hint, choices, span, battery, driven)
         drive_on(rule, engine[min(hint, len(engine) - 1)], 0, choices, battery, driven)
-        found[n] = result_of(rule, driven, steps.nox_kg, choices, span)
+        found[n] = result_of(driven, steps.nox_kg, choices, span)
     return found

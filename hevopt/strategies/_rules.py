@@ -118,9 +118,9 @@ def rules_of(problem: Problem, like: Rules | None = None) -> Rules:
     price_kgpj = one_price_dual(problem)[-1].price_kgpj if like is None else like.price_kgpj
     standing = signals.speed_mps == 0
     steps = family.FamilySteps(
-        off=_least(choices, choices.power_w, ~on),
-        electric=_least(choices, choices.power_w, fuel == 0),
-        recover=_least(choices, choices.power_w, fuel == _step_minimum(choices, fuel)[step]),
+        off=least_entries(choices, choices.power_w, ~on),
+        electric=least_entries(choices, choices.power_w, fuel == 0),
+        recover=least_entries(choices, choices.power_w, fuel == _step_minimum(choices, fuel)[step]),
         standing=standing,
         engaging=standing & (signals.gear > 0),
         braking=signals.wheel_power_w < 0,
@@ -152,7 +152,7 @@ def _charging_w(choices: Choices) -> Array:
 
 def usual_limits(rules: Rules) -> ElectricLimits:
     """Where the file says nothing: the usual state of charge, any power and speed."""
-    battery, given = rules.problem.battery, rules.problem.thresholds
+    battery, given = rules.problem.battery, rules.problem.thresholds.electric
     share_soc = battery.soc_min + _SOC_LEVEL_SHARE * (battery.soc_max - battery.soc_min)
     chosen = share_soc, np.inf, np.inf
     return ElectricLimits(
@@ -261,16 +261,27 @@ def _row(rules: Rules, limits: ElectricLimits) -> Array:
 
 def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
     """(level, time) entries that the engine drives with under a cap on NOx, by charging power."""
-    steps, choices = rules.steps, rules.choices
-    shifted = kernels.load_point_choices(
-        choices, steps.nox_kg, rules.fired, rules.charge_w, float(nox_cap_kgps)
-    )
-    shifted = np.where(shifted >= 0, shifted, steps.recover)
+    shifted = shifted_entries(rules, nox_cap_kgps)
     # Load-point shift is for driving; standing, the engine covers the electric load and no more.
-    return np.where(steps.standing, shifted[_ASSIST_LEVELS], shifted)
+    return np.where(rules.steps.standing, shifted[_ASSIST_LEVELS], shifted)
 
 
-def _least(choices: Choices, figure: Array, allowed: Flags) -> Indices:
+def shifted_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
+    """(level, time) entries of least cost with the engine on, by charging power, standing or driving."""
+    steps = rules.steps
+    shifted = kernels.load_point_choices(
+        rules.choices, steps.nox_kg, rules.fired, rules.charge_w, float(nox_cap_kgps)
+    )
+    return np.where(shifted >= 0, shifted, steps.recover)
+
+
+def idle_entries(rules: Rules) -> Indices:
+    """(time,) those of them that leave the battery alone."""
+    entries: Indices = shifted_entries(rules)[_ASSIST_LEVELS]
+    return entries
+
+
+def least_entries(choices: Choices, figure: Array, allowed: Flags) -> Indices:
     """(time,) entry of least figure among the allowed ones, -1 where there is none."""
     masked = np.where(allowed, figure, np.inf)
     least = _step_minimum(choices, masked)

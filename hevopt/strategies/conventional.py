@@ -89,7 +89,7 @@ def solve(
 
 def _axes(rules: Rules) -> list[Array]:
     """Values of each threshold, rising: those of the file where it gives them."""
-    steps, given, battery = rules.steps, rules.problem.thresholds, rules.problem.battery
+    steps, given, battery = rules.steps, rules.problem.thresholds.electric, rules.problem.battery
     width = battery.soc_max - battery.soc_min
     top_w, top_mps = (
         float(np.max(of[rules.electric], initial=0.0)) for of in (steps.power_w, steps.speed_mps)

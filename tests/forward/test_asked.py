@@ -62,7 +62,7 @@ def test_what_it_decides_follows_from_what_is_stored(urban):
 
 
 def test_only_strategies_that_need_not_know_the_cycle_decide():
-    able = ("conventional", "nox_cut", "a_ecms", "sdp", "mpc")
+    able = ("conventional", "nox_cut", "power_follower", "thermostat", "a_ecms", "sdp", "mpc")
     assert all(decides(name) for name in able)
     assert not any(decides(name) for name in ("dp", "ecms", "convex", "baseline", "start_stop"))
 
