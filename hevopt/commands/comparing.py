@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hevopt.pages.comparison.collect import Collector
     from hevopt.problem.problem import Plan, Trajectory
     from hevopt.strategies import Strategy
+    from hevopt.studies.by_car import Observe
     from hevopt.studies.cars import Cars
     from hevopt.studies.case import Case
     from hevopt.studies.comparison import Comparison
@@ -138,7 +139,15 @@ class Files:
         check_planned(steps, len(cars), rows)
         self._collector = Collector()
 
-    def observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
+    @property
+    def observer(self) -> "Observe":
+        """Who takes what the files need of solved cases: nobody where rows are all that they need."""
+        from hevopt.studies.by_car import unobserved
+
+        asked = (self._collector, self.proofs, self.steps)
+        return unobserved if all(files is None for files in asked) else self._observe
+
+    def _observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
         """Take what the files need of a solved case."""
         if self._collector is not None:
             self._collector.observe(case, row, plan, trajectory)

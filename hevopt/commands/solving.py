@@ -103,6 +103,7 @@ def compare(
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies import comparison as study
+    from hevopt.studies.by_car import Watch
     from hevopt.studies.cars import cars_of
     from hevopt.studies.settings import given_of, joined, study_of
     from hevopt.studies.study_file import read_study
@@ -121,8 +122,8 @@ def compare(
     compared = partial(study.compare_cars, cars.cars, settings=settings, others=others)
     say_how_long(job.trace, compared)
     with Progress() as progress:
-        watch = study.Watch(progress, files.observe)
-        comparison = compared(job.trace, watch=watch, forward=forward)
+        watch = Watch(progress, files.observer)
+        comparison = compared(job.trace, watch=watch, forward=forward, may_fork=True)
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
     show_comparison(job, comparison, json=json, wide=wide)
     lines, of_files = files.write(job, comparison)
@@ -163,6 +164,7 @@ def run(
     from hevopt.output import file_tables as outputs
     from hevopt.output import terminal_tables as report
     from hevopt.studies import comparison as study
+    from hevopt.studies.by_car import lost_proofs
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
     from hevopt.studies.settings import given_of, study_of
@@ -194,7 +196,7 @@ def run(
         {},
         settings.nox_weight,
         end_asked=study.end_asked([car]),
-        lost_proofs=study.lost_proofs(case),
+        lost_proofs=lost_proofs(case),
         causal=causal_among([row], peeking, others),
         peeking=peeking,
     )

@@ -1,9 +1,9 @@
 """The study: run strategies on architectures over one cycle, and collect a row for each."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown, html_table
@@ -18,19 +18,18 @@ from hevopt.errors import (
 from hevopt.files.keywords import check_keywords
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.strategies import Strategy, chosen, strategy_named
+from hevopt.studies.by_car import NOBODY, Observe, Progress, Solving, Watch, unobserved, unseen
 from hevopt.studies.cars import cars_of
-from hevopt.studies.case import Case, prepare
+from hevopt.studies.case import Case
 from hevopt.studies.drawing import draw_rows
 from hevopt.studies.forward_rows import ForwardFigures, forward_figures
 from hevopt.studies.frames import rows_frame
-from hevopt.studies.rows import Row, against_reference, failed_row
+from hevopt.studies.rows import Row, against_reference
 from hevopt.studies.settings import Keywords, Settings, settings_from
 from hevopt.studies.solved import (
     causal_among,
     check_horizon,
-    run_case,
     strategies_for,
-    why_not_causal,
 )
 
 if TYPE_CHECKING:
@@ -93,32 +92,6 @@ class Comparison(Shown):
         return rows_frame(self.cycle, self.rows, self.forward)
 
 
-# Called with what comes next, and how many of how many are done.
-Progress = Callable[[str, int, int], None]
-# Called with every solved case, its row (no reference yet), plan and trajectory.
-Observe = Callable[[Case, Row, Plan, Trajectory], None]
-
-
-def unseen(text: str, done: int, total: int) -> None:
-    """Nobody looks on."""
-
-
-def unobserved(case: Case, row: Row, plan: Plan, trajectory: Trajectory) -> None:
-    """Nobody keeps anything."""
-
-
-class Watch(NamedTuple):
-    """Who is told while a comparison runs.
-
-    progress: what comes next, and how many cases of how many are done
-    observe: every solved case, its row (no reference yet), plan and trajectory
-    """
-
-    progress: Progress = unseen
-    observe: Observe = unobserved
-
-
-_NOBODY = Watch()
 _NO_OTHERS: Mapping[str, Strategy] = {}
 # A name, names and pairs (name, function), or a function by its name.
 Strategies = str | Sequence[str | tuple[str, Any]] | Mapping[str, Any]
@@ -174,52 +147,31 @@ def compare_cars(
     settings: Settings,
     *,
     others: Mapping[str, Strategy] = _NO_OTHERS,
-    watch: Watch = _NOBODY,
+    watch: Watch = NOBODY,
     forward: bool = False,
+    may_fork: bool = False,
 ) -> Comparison:
     """The strategies of the settings on cars in which the settings are made already; see `compare`.
 
     others: strategies beside those shipped and registered; forward: drive every row forward as well
+    may_fork: share the cars with a process forked from this one, on drives short enough for the memory of two; cars
+    that are observed or driven forward are solved by one process
     """
     driven: dict[tuple[str, str], ForwardFigures] = {}
     if forward:
         watch = watch._replace(observe=_driving(watch.observe, settings.horizon_s, driven))
-    found = _compared(cars, cycle, settings, others, watch)
-    return replace(found, forward=driven)
-
-
-def _compared(
-    cars: Sequence[Architecture],
-    cycle: Cycle,
-    settings: Settings,
-    others: Mapping[str, Strategy],
-    watch: Watch,
-) -> Comparison:
     if cycle.distance_m < DISTANCE_MIN_M:
         raise DataError(
             f"cycle {cycle.name}: distance {cycle.distance_m:.3g} m; needed: {DISTANCE_MIN_M:g} m or more"
         )
-    plans = [(car, strategies_for(car, settings.strategies, others)) for car in cars]
-    named = list(dict.fromkeys(name for _, names in plans for name in names))
+    asked = [(car, strategies_for(car, settings.strategies, others)) for car in cars]
+    named = list(dict.fromkeys(name for _, names in asked for name in names))
     check_horizon(settings.horizon_s, named, others)
-    total = sum(len(names) for _, names in plans)
-    rows: list[Row] = []
-    failures: dict[str, HevoptError] = {}
-    lost: dict[str, str] = {}
-    peeking: dict[tuple[str, str], str] = {}
-    for car, wanted in plans:
-        done = len(rows)
-        watch.progress(f"{car.name}: table and certificate", done, total)
-        try:
-            case = prepare(car, cycle, settings)
-        except _FAILURES as error:
-            failures[car.name] = error
-            rows += [failed_row(car, name, error) for name in wanted]
-            continue
-        lost |= lost_proofs(case)
-        for n, name in enumerate(wanted):
-            watch.progress(f"{car.name}: {name}", done + n, total)
-            rows.append(_row(case, name, settings, others, watch, failures, peeking))
+    solving = Solving(asked, cycle, settings, others, watch)
+    found = solving.found(may_fork)
+    failures = {case: error for of_car in found for case, error in of_car.failures.items()}
+    peeking = {row: why for of_car in found for row, why in of_car.peeking.items()}
+    rows = [row for of_car in found for row in of_car.rows]
     _raise_unknown_nox(rows, failures)
     rows, reference = against_reference(rows)
     return Comparison(
@@ -230,9 +182,10 @@ def _compared(
         reference,
         settings.free_gear,
         end_asked(cars),
-        lost,
+        {proof: why for of_car in found for proof, why in of_car.lost.items()},
         causal=causal_among(rows, peeking, others),
         peeking=peeking,
+        forward=driven,
     )
 
 
@@ -248,42 +201,11 @@ def _driving(
     return both
 
 
-def _row(
-    case: Case,
-    strategy: str,
-    settings: Settings,
-    others: Mapping[str, Strategy],
-    watch: Watch,
-    failures: dict[str, HevoptError],
-    peeking: dict[tuple[str, str], str],
-) -> Row:
-    """The row of a strategy, observed; where it fails, one that says so, and the error among the failures.
-
-    What shows that it knows more of the cycle than it says is put to what peeks.
-    """
-    try:
-        solved = run_case(case, strategy, settings.horizon_s, others)
-        shown = why_not_causal(case, strategy, solved[1], others)
-    except _FAILURES as error:
-        failures[f"{case.car.name} {strategy}"] = error
-        return failed_row(case.car, strategy, error)
-    if shown is not None:
-        peeking[case.car.name, strategy] = shown
-    watch.observe(case, *solved)
-    return solved[0]
-
-
 def _raise_unknown_nox(rows: Sequence[Row], failures: Mapping[str, HevoptError]) -> None:
     """UnknownNoxError where nothing was asked but what needs data on NOx that there are not."""
     unknown = [error for error in failures.values() if isinstance(error, UnknownNoxError)]
     if unknown and len(unknown) == len(failures) and not any(row.solved for row in rows):
         raise unknown[0]
-
-
-def lost_proofs(case: Case) -> dict[str, str]:
-    """Architecture and kind of proof -> why a proof was tried on a case and not found."""
-    failures = case.certificate.failures.items()
-    return {f"{case.car.name}, {kind}": message for kind, message in failures}
 
 
 def end_asked(cars: Iterable[Architecture]) -> dict[str, float]:

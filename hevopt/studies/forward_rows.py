@@ -1,17 +1,17 @@
 """What the rows of a comparison do when they are driven forward: figures beside the backward ones."""
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.problem import Trajectory
 from hevopt.studies.case import Case
-from hevopt.studies.driven import DrivenPlan, Manner, drive_solved
 from hevopt.studies.rows import Row
 from hevopt.units import KMH_PER_MPS
 
-_HOW = Manner()
+if TYPE_CHECKING:
+    from hevopt.studies.driven import DrivenPlan
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -50,14 +50,17 @@ def forward_figures(
     case: Case, row: Row, trajectory: Trajectory, horizon_s: float | None
 ) -> ForwardFigures:
     """A solved row of a case driven forward; what cannot be driven says so in its status."""
+    # The forward plant: what drives nothing forward need not read it.
+    from hevopt.studies.driven import Manner, drive_solved
+
     try:
-        driven = drive_solved(case, row.strategy, horizon_s, (row, trajectory), _HOW)
+        driven = drive_solved(case, row.strategy, horizon_s, (row, trajectory), Manner())
     except (DataError, InfeasibleError) as error:
         return ForwardFigures(f"not driven: {error.headline}")
     return figures_of(driven)
 
 
-def figures_of(driven: DrivenPlan) -> ForwardFigures:
+def figures_of(driven: "DrivenPlan") -> ForwardFigures:
     """The figures of a forward run."""
     run = driven.run
     return ForwardFigures(

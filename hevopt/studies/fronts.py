@@ -14,9 +14,10 @@ from hevopt.files.frames import TYPES
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.problem import Problem
 from hevopt.strategies import Strategy, chosen, strategy_named
+from hevopt.studies.by_car import Progress, unseen
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import litres, prepare, require_nox
-from hevopt.studies.comparison import Progress, Strategies, unseen
+from hevopt.studies.comparison import Strategies
 from hevopt.studies.pareto import GAP_ENOUGH, POINTS_MAX, SAME, Front, HalfPlane, front
 from hevopt.studies.rows import shortfall_steps
 from hevopt.studies.settings import Keywords, Settings, settings_from

@@ -18,9 +18,10 @@ from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle, load_cycle
 from hevopt.errors import DataError, HevoptError
 from hevopt.strategies import Strategy, chosen, fitting, strategy_named
+from hevopt.studies.by_car import Progress, unseen
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
-from hevopt.studies.comparison import Progress, Strategies, unseen
+from hevopt.studies.comparison import Strategies
 from hevopt.studies.rows import Row
 from hevopt.studies.settings import Keywords, Settings, settings_from
 from hevopt.studies.solved import check_horizon, run_case

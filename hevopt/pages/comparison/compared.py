@@ -15,16 +15,10 @@ from hevopt.pages.comparison.results import ParetoFront, Results, Sensitivity, p
 from hevopt.pages.comparison.room import check_planned, check_room
 from hevopt.reproduction.published import is_study
 from hevopt.strategies import Strategy, chosen
+from hevopt.studies.by_car import Progress, Watch, unseen
 from hevopt.studies.cars import Cars, cars_of
 from hevopt.studies.case import require_nox
-from hevopt.studies.comparison import (
-    Comparison,
-    Progress,
-    Strategies,
-    Watch,
-    compare_cars,
-    unseen,
-)
+from hevopt.studies.comparison import Comparison, Strategies, compare_cars
 from hevopt.studies.fronts import front_of
 from hevopt.studies.provenance import files_digests
 from hevopt.studies.sensitivity import effects_on

@@ -1,0 +1,104 @@
+"""Work shared out between this process and one forked from it, where that is sound and pays."""
+
+import mmap
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+from hevopt.errors import HevoptError
+
+_Result = TypeVar("_Result")
+
+
+class SharedCount:
+    """How much is done, by both processes; each counts in a place of its own, which the other reads.
+
+    of_first: whether the process it is used in is the first one, not the one forked from it
+    """
+
+    def __init__(self) -> None:
+        self._counts = memoryview(mmap.mmap(-1, 16)).cast("q")
+        self.of_first = True
+
+    def add(self, count: int) -> None:
+        self._counts[int(self.of_first)] += count
+
+    def total(self) -> int:
+        return sum(self._counts)
+
+    def in_other_process(self) -> None:
+        """Count in the other's place from now on."""
+        self.of_first = False
+
+
+def two_processors() -> bool:
+    """Whether a process can be forked here without harm, and has a processor of its own to run on."""
+    if not hasattr(os, "fork") or threading.active_count() > 1:
+        return False
+    return len(os.sched_getaffinity(0)) > 1 if hasattr(os, "sched_getaffinity") else False
+
+
+def halves(work: Callable[[int], _Result], count: int, tally: SharedCount) -> list[_Result]:
+    """work(0) to work(count - 1), at most 256; a process forked from this one takes every call that is next when it
+    is free.
+
+    Results come back in order, whoever made them, and so does an error: the first that is raised on purpose. What
+    the other process does not bring back, as where it was killed, is done here.
+    """
+    from multiprocessing import get_context
+
+    tickets, issued = os.pipe()
+    os.write(issued, bytes(range(count)))
+    os.close(issued)
+    context = get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    other = context.Process(target=_other, args=(work, tickets, tally, there), daemon=True)
+    other.start()
+    there.close()
+    try:
+        found = _taken(work, tickets)
+        with suppress(EOFError, OSError, pickle.UnpicklingError):
+            found |= here.recv()
+        for n in range(count):
+            if n not in found:
+                found[n] = _tried(work, n)
+    finally:
+        other.terminate()
+        other.join()
+        os.close(tickets)
+        here.close()
+    results: list[_Result] = []
+    for n in range(count):
+        result = found[n]
+        if isinstance(result, HevoptError):
+            raise result
+        results.append(result)
+    return results
+
+
+def _other(work: Callable[[int], Any], tickets: int, tally: SharedCount, there: Connection) -> None:
+    # The first process is interrupted, and ends this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    tally.in_other_process()
+    there.send(_taken(work, tickets))
+
+
+def _taken(work: Callable[[int], Any], tickets: int) -> dict[int, Any]:
+    """What this process does of the work, by number: what comes next, until nothing is left."""
+    found = {}
+    while ticket := os.read(tickets, 1):
+        found[ticket[0]] = _tried(work, ticket[0])
+    return found
+
+
+def _tried(work: Callable[[int], Any], n: int) -> Any:
+    try:
+        return work(n)
+    except HevoptError as error:
+        return error

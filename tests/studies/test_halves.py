@@ -1,0 +1,108 @@
+"""Work shared between two processes: the same results, errors and interrupts as by one."""
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from dataclasses import asdict
+
+import pytest
+
+from hevopt.driving.cycle import load_cycle
+from hevopt.errors import DataError, InfeasibleError
+from hevopt.studies.by_car import Watch
+from hevopt.studies.cars import cars_of
+from hevopt.studies.comparison import compare_cars
+from hevopt.studies.halves import SharedCount, halves, two_processors
+from hevopt.studies.settings import Settings
+
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork"),
+    # Workers of the test runner have threads, which from Python 3.12 on is warned of.
+    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),
+]
+
+
+def test_results_come_back_in_order_from_both_processes() -> None:
+    def work(n: int) -> tuple[int, int]:
+        time.sleep(0.02)
+        tally.add(1)
+        return n * n, os.getpid()
+
+    tally = SharedCount()
+    found = halves(work, 12, tally)
+
+    assert [square for square, _ in found] == [n * n for n in range(12)]
+    assert len({process for _, process in found}) == 2
+    assert tally.total() == 12
+
+
+def test_first_error_in_order_is_raised_whoever_met_it() -> None:
+    def work(n: int) -> int:
+        time.sleep(0.02)
+        if n in (3, 4):
+            raise (DataError if n == 3 else InfeasibleError)(f"fault {n}")
+        return n
+
+    for _ in range(3):
+        with pytest.raises(DataError, match="fault 3"):
+            halves(work, 8, SharedCount())
+
+
+def test_what_a_killed_process_does_not_bring_back_is_done_here() -> None:
+    own = os.getpid()
+
+    def work(n: int) -> int:
+        if os.getpid() != own:
+            os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(0.02)
+        return n
+
+    assert halves(work, 6, SharedCount()) == list(range(6))
+
+
+def test_interrupt_leaves_no_process_behind() -> None:
+    own = os.getpid()
+
+    def work(n: int) -> int:
+        if os.getpid() == own:
+            raise KeyboardInterrupt
+        time.sleep(60)
+        return n
+
+    with pytest.raises(KeyboardInterrupt):
+        halves(work, 4, SharedCount())
+    assert not multiprocessing.active_children()
+
+
+def test_comparison_by_two_processes_is_that_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = Settings(strategies=("start_stop", "dp"))
+    cars = cars_of(("A", "B", "C1"), settings).cars
+    cycle = load_cycle("nedc")
+    told: list[tuple[int, int]] = []
+    monkeypatch.setattr("hevopt.studies.by_car.two_processors", lambda: True)
+
+    watch = Watch(lambda _, done, total: told.append((done, total)))
+    forked = compare_cars(cars, cycle, settings, watch=watch, may_fork=True)
+    alone = compare_cars(cars, cycle, settings)
+
+    assert [_untimed(row) for row in forked.rows] == [_untimed(row) for row in alone.rows]
+    assert forked.reference == alone.reference
+    assert forked.failures.keys() == alone.failures.keys()
+    assert all(0 <= done < total for done, total in told)
+
+
+def test_a_process_with_threads_is_not_forked() -> None:
+    enough = threading.Event()
+    thread = threading.Thread(target=enough.wait)
+    thread.start()
+    try:
+        assert not two_processors()
+    finally:
+        enough.set()
+        thread.join()
+
+
+def _untimed(row: object) -> dict[str, object]:
+    return {name: value for name, value in asdict(row).items() if name != "solve_s"}  # type: ignore[call-overload]
