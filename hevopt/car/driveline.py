@@ -5,7 +5,7 @@ the step makes of the rest: the car stands or moves, the driver's clutch is clos
 lists a gear. State and phase together are a way to drive (ways.py).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal, NamedTuple
@@ -79,13 +79,13 @@ class Driveline:
     @property
     def engine_apart(self) -> bool:
         """Whether an engine is joined to the wheels by clutches alone, if at all."""
-        if self.engine is None:
-            return False
-        fixed = [set(part.shafts) for part in self.parts if not isinstance(part, Clutch)]
-        reached = {self.engine}
-        for _ in fixed:
-            reached |= {shaft for shafts in fixed if shafts & reached for shaft in shafts}
-        return WHEEL not in reached
+        fixed = [part for part in self.parts if not isinstance(part, Clutch)]
+        return self.engine is not None and WHEEL not in _joined(self.engine, fixed)
+
+    @property
+    def engine_reaches_wheels(self) -> bool:
+        """Whether parts, clutches among them, join an engine and the wheels."""
+        return self.engine is not None and WHEEL in _joined(self.engine, self.parts)
 
     @property
     def boxes(self) -> tuple[Gearbox, ...]:
@@ -136,6 +136,14 @@ class Driveline:
         return Use(part, "locked" if isinstance(part, OneWayClutch) else "closed") if (
             part.name in state.closed
         ) else None  # fmt: skip
+
+
+def _joined(shaft: str, parts: Sequence[Part]) -> set[str]:
+    """The shafts that parts join to a shaft, itself among them."""
+    reached = {shaft}
+    for _ in parts:
+        reached |= {end for part in parts if reached & set(part.shafts) for end in part.shafts}
+    return reached
 
 
 def _geared(box: Gearbox, state: State, phase: Phase) -> Use | None:

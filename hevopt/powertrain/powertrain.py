@@ -11,6 +11,7 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.engine import ELECTRICITY_JPKG
+from hevopt.car.storing import storing_kgpj
 from hevopt.driving.cycle import Cycle
 from hevopt.driving.demand import Demand, demand_of
 from hevopt.driving.driver import change_down
@@ -59,7 +60,7 @@ def build_problem(
     problem = Problem(
         table, architecture.battery, architecture.soc_start, architecture.soc_end, 0, nox_weight,
         1 / ELECTRICITY_JPKG if architecture.electric else 0.0,
-        architecture.thresholds,
+        architecture.thresholds, storing_kgpj(architecture),
     )  # fmt: skip
     engine = architecture.engine
     return with_dwell(problem, engine.least_on_s, engine.least_off_s)

@@ -34,6 +34,7 @@ class Problem(Shown):
     nox_weight: kg of fuel that a kg of NOx counts
     electricity_kgpj: kg of fuel that a joule from the battery's terminals counts; 0 but in a car without an engine
     thresholds: what the rules' thresholds are where they are not calibrated
+    storing_kgpj: fuel that an engine of free speed takes to deliver a joule to the battery; None without one
     cost_kg: (time, control) what a step counts: fuel plus weighted NOx and electricity
     start_j, end_min_j, window_j: stored energy before the first step, least at the end, at the window's ends
     A control whose power the battery cannot deliver or take at every state of charge of its window is rejected.
@@ -47,6 +48,7 @@ class Problem(Shown):
     nox_weight: float = 0.0
     electricity_kgpj: float = 0.0
     thresholds: Thresholds = OPEN
+    storing_kgpj: float | None = None
     cost_kg: Array = field(init=False)
     start_j: float = field(init=False)
     end_min_j: float = field(init=False)

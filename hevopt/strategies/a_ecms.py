@@ -11,10 +11,12 @@ what a stop would give back, (energy recovered per square of speed) x speed²; t
 way, from the energy stored while braking over the fall of speed². Towards the lower end of the window s grows up
 to fourfold, towards the upper end it goes to 0, and no control may leave the window while another keeps it.
 
-base = 1 / (0.45 x 0.94 x 42.9 MJ/kg), over the battery's coulombic efficiency: the fuel it takes to store a joule
-more while the engine runs anyway, at the slope of work over fuel energy of a diesel engine under load, and the
-efficiencies of the machine and of charging. A switch, a start above all, pays only its share `start_share` at once,
-of fuel and stored energy alike: the engine runs for some steps after it. One that has to pay within a step comes
+base: the fuel that it takes to store a joule more. With an engine of free speed, in series cars and power splits,
+the car's own: `storing_kgpj` of the problem, derived from the maps of engine and generator in car/storing.py. Where
+the engine's speed is the road's, it runs anyway: 1 / (0.45 x 0.94 x 42.9 MJ/kg), at the slope of work over fuel
+energy of a diesel engine under load and the efficiency of the machine. Either is over the battery's coulombic
+efficiency. A switch, a start above all, pays only its share `start_share` at once, of fuel and
+stored energy alike: the engine runs for some steps after it. One that has to pay within a step comes
 too late, one that pays nothing makes the engine chatter. Feedback on the charge is that of J. T. B. A. Kessels,
 M. W. T. Koot, P. P. J. van den Bosch and D. B. Kok, "Online energy management for hybrid electric vehicles", IEEE
 Trans. Veh. Technol. 57 (2008), and of S. Onori and L. Serrao, "On adaptive-ECMS strategies for hybrid electric
@@ -101,23 +103,33 @@ class AdaptiveFactor:
 
 
 def start(
-    problem: Problem, *, window_s: float | None = None, feedback: kernels.Feedback = FEEDBACK
+    problem: Problem, *, window_s: float | None = None, feedback: kernels.Feedback | None = None
 ) -> AdaptiveFactor:
-    """The strategy before the first step; with `window_s`, its base is re-estimated over the past window."""
+    """The strategy before the first step; with `window_s`, its base is re-estimated over the past window.
+
+    feedback: its parameters; None for FEEDBACK with the base of the problem's own car
+    """
     if window_s is not None and not window_s >= _WINDOW_MIN_S:
         raise DataError(f"window_s {window_s}; allowed: {_WINDOW_MIN_S:g} s or more, or None")
+    own = _feedback_of(problem) if feedback is None else feedback
     return AdaptiveFactor(
-        problem, feedback._replace(window_s=np.inf if window_s is None else float(window_s))
+        problem, own._replace(window_s=np.inf if window_s is None else float(window_s))
     )
 
 
 def start_on(problem: Problem, points: Problem, interval_s: float) -> AdaptiveFactor:
     """The strategy on operating points, asked for any of them as often as they come up."""
-    return AdaptiveFactor(points, FEEDBACK, interval_s)
+    return AdaptiveFactor(points, _feedback_of(problem), interval_s)
+
+
+def _feedback_of(problem: Problem) -> kernels.Feedback:
+    """The usual parameters, with the base of the problem's car where it has one."""
+    base_kgpj = problem.storing_kgpj
+    return FEEDBACK if base_kgpj is None else FEEDBACK._replace(base_kgpj=base_kgpj)
 
 
 def solve(
-    problem: Problem, *, window_s: float | None = None, feedback: kernels.Feedback = FEEDBACK
+    problem: Problem, *, window_s: float | None = None, feedback: kernels.Feedback | None = None
 ) -> Plan:
     """The plan of one causal pass; with `window_s`, its base re-estimated over the past window."""
     stepper = start(problem, window_s=window_s, feedback=feedback)

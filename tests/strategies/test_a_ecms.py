@@ -5,7 +5,18 @@ import pytest
 from conftest import CYCLES, HYBRIDS
 from problems import random_problem, rows
 
-from hevopt import Battery, ControlTable, DataError, Problem, certify, simulate
+from hevopt import (
+    Battery,
+    ControlTable,
+    DataError,
+    Problem,
+    build_problem,
+    certify,
+    load_architecture,
+    load_cycle,
+    simulate,
+)
+from hevopt.car.storing import storing_kgpj
 from hevopt.problem.choices import choices_of
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies import a_ecms, dp
@@ -132,3 +143,31 @@ def test_every_control_taken_is_feasible_on_tables_without_signals(seed):
 def test_a_window_that_is_none_is_refused(problem_of, window_s):
     with pytest.raises(DataError, match="window_s"):
         a_ecms.solve(problem_of("C2", "nedc"), window_s=window_s)
+
+
+def test_a_car_of_free_engine_speed_has_the_price_of_its_own_engine_and_generator():
+    """By hand: engine and generator of series_1500 on one shaft, all operating points of the engine's map."""
+    car = load_architecture("series_1500")
+    engine, generator = car.engine, car.machines[0]
+    best = 0.0
+    for speed in np.linspace(engine.idle_radps, engine.speed_max_radps, 60):
+        for torque in np.linspace(5.0, float(engine.full_load_nm(speed)), 60):
+            made_w = torque * speed - float(generator.loss_w(-torque, speed))
+            fuel_kgps = float(engine.fuel_kgps(np.array(torque), np.array(speed)))
+            if fuel_kgps > 0:  # nor NaN
+                best = max(best, made_w / fuel_kgps)
+    assert storing_kgpj(car) == pytest.approx(1 / best, rel=2e-3)
+    assert storing_kgpj(car) > 1.2 * a_ecms.FEEDBACK.base_kgpj
+    split = load_architecture("prius_1998")
+    share = split.engine.best_efficiency * 0.94 * split.engine.heating_value_jpkg
+    assert storing_kgpj(split) == pytest.approx(1 / share)
+    assert storing_kgpj(load_architecture("C2")) is storing_kgpj(load_architecture("A")) is None
+
+
+def test_a_series_car_keeps_its_charge_by_feedback_alone():
+    car = load_architecture("series_1500")
+    problem = build_problem(car, load_cycle("udds"), levels=7)
+    own, shared = a_ecms.solve(problem), a_ecms.solve(problem, feedback=a_ecms.FEEDBACK)
+    ends = [gained_percent(problem, simulate(problem, plan.control)) for plan in (own, shared)]
+    assert own.notes["base_kgpj"] == storing_kgpj(car) / problem.battery.coulombic_efficiency
+    assert abs(ends[0]) < 0.8 and ends[1] < -1.0
