@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hevopt.studies.by_car import Observe
     from hevopt.studies.cars import Cars
     from hevopt.studies.case import Case
+    from hevopt.studies.cold_start import ColdStarts
     from hevopt.studies.comparison import Comparison
     from hevopt.studies.rows import Row
     from hevopt.studies.settings import Settings
@@ -30,7 +31,7 @@ _NAMED = ("nox_weight", "allow_shortfall", "free_gear", "refine", "horizon_s")
 @dataclass(frozen=True)
 class ComparisonJob:
     """Cars on a cycle, the settings that they are solved with, the study file, if they come from one, and the
-    strategies that were brought, by name.
+    strategies that were brought, by name; cold: takes what rows burn from a cold start, where that is asked for
     """
 
     cars: "Cars"
@@ -38,6 +39,7 @@ class ComparisonJob:
     settings: "Settings"
     file: Path | None = None
     brought: "Mapping[str, Strategy]" = field(default_factory=dict)
+    cold: "ColdStarts | None" = None
 
     @cached_property
     def inputs(self) -> dict[str, str]:
@@ -55,7 +57,9 @@ class ComparisonJob:
 
     @cached_property
     def about(self) -> dict[str, Any]:
-        """What a result comes from: digests of the files read, versions, and the settings made."""
+        """What a result comes from: digests of the files read, versions, and the settings made; and what the rows
+        solved so far burn from a cold start, where that is asked for."""
+        from hevopt.output.cold_tables import cold_contents
         from hevopt.studies.provenance import changes_shown, digests_shown, versions
 
         return {
@@ -66,6 +70,7 @@ class ComparisonJob:
                 "changes": changes_shown(self.cars.changes),
                 "left_out": self.cars.left_out,
             },
+            **({} if self.cold is None else {"cold_start": cold_contents(self.cold)}),
         }
 
     @cached_property
@@ -82,7 +87,7 @@ class Files:
 
     out: rows; steps: every step of every row; page, save: the report and what it is made from, with fronts and
     effects (sensitivities) of every car where asked for; proofs: the folder that every row's bound goes to
-    nox_limit: what the page draws a line at, mg/km
+    nox_limit: what the page draws a line at, mg/km; cold: takes what rows burn from a cold start
     """
 
     out: Path | None
@@ -93,6 +98,7 @@ class Files:
     fronts: bool
     effects: bool
     nox_limit: float | None = None
+    cold: "ColdStarts | None" = None
     _collector: "Collector | None" = field(default=None, init=False)
     _proven: list[tuple[str, Any, Any]] = field(default_factory=list, init=False)
     _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
@@ -141,16 +147,18 @@ class Files:
 
     @property
     def observer(self) -> "Observe":
-        """Who takes what the files need of solved cases: nobody where rows are all that they need."""
+        """Who takes what files and cold starts need of solved cases: nobody where rows are all."""
         from hevopt.studies.by_car import unobserved
 
-        asked = (self._collector, self.proofs, self.steps)
+        asked = (self._collector, self.proofs, self.steps, self.cold)
         return unobserved if all(files is None for files in asked) else self._observe
 
     def _observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
         """Take what the files need of a solved case."""
         if self._collector is not None:
             self._collector.observe(case, row, plan, trajectory)
+        if self.cold is not None:
+            self.cold.observe(case, row, plan, trajectory)
         if self.proofs is not None:
             name = f"{case.cycle.name}_{row.architecture}_{row.strategy}"
             self._proven.append((name, trajectory, case.certificate))
@@ -211,6 +219,10 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
     left = report.left_out(rows)
     notes = [f"left out for want of width: {', '.join(left)}; --wide shows them."] if left else []
     show_notes("\n".join([*notes, report.comparison_notes(comparison), *job.cars.said()]))
+    if job.cold is not None and job.cold.figures:
+        from hevopt.output.cold_tables import cold_table
+
+        show(cold_table(job.cold))
 
 
 def show_comparison(

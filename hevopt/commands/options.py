@@ -18,6 +18,14 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 WideOption = Annotated[
     bool, typer.Option("--wide", help="Show all columns, however narrow the terminal.")
 ]
+ColdStartOption = Annotated[
+    float | None,
+    typer.Option(
+        "--cold-start",
+        metavar="DEG_C",
+        help="Tell what every row burns from a start at this temperature, too.",
+    ),
+]
 ArchitectureArgument = Annotated[str, typer.Argument(help="Name or TOML file of an architecture.")]
 
 

@@ -11,6 +11,7 @@ from hevopt.commands.brought import PolicyOption
 from hevopt.commands.grouped import FILES, PAGE
 from hevopt.commands.options import (
     ArchitectureArgument,
+    ColdStartOption,
     CycleGivenOption,
     CycleOption,
     JsonOption,
@@ -93,6 +94,7 @@ def compare(
     effects: Annotated[
         bool, typer.Option("--sensitivity", help="Add every car's sensitivities to the page.")
     ] = False,
+    cold_start: ColdStartOption = None,
     forward: Annotated[
         bool, typer.Option("--forward", help="Drive every row forward too, as `drive` does.")
     ] = False,
@@ -105,6 +107,7 @@ def compare(
     from hevopt.studies import comparison as study
     from hevopt.studies.by_car import Watch
     from hevopt.studies.cars import cars_of
+    from hevopt.studies.cold_start import ColdStarts
     from hevopt.studies.settings import given_of, joined, study_of
     from hevopt.studies.study_file import read_study
 
@@ -116,8 +119,9 @@ def compare(
     folder = study_path.parent if study_path is not None and of_study else None
     settings, others = brought_to(asked.settings, policy, folder)
     cars = cars_of(asked.architectures, settings)
-    job = ComparisonJob(cars, load_cycle(asked.cycle), settings, study_path, others)
-    files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit)
+    cold = None if cold_start is None else ColdStarts(cold_start)
+    job = ComparisonJob(cars, load_cycle(asked.cycle), settings, study_path, others, cold)
+    files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit, cold)
     files.check(job)
     compared = partial(study.compare_cars, cars.cars, settings=settings, others=others)
     say_how_long(job.trace, compared)
@@ -154,6 +158,7 @@ def run(
     ] = None,
     json: JsonOption = False,
     wide: WideOption = False,
+    cold_start: ColdStartOption = None,
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
     from hevopt.commands.brought import one_of
@@ -167,6 +172,7 @@ def run(
     from hevopt.studies.by_car import lost_proofs
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
+    from hevopt.studies.cold_start import ColdStarts
     from hevopt.studies.settings import given_of, study_of
     from hevopt.studies.solved import causal_among, check_horizon, run_case, why_not_causal
 
@@ -174,8 +180,9 @@ def run(
     name, others = one_of(strategy, policy)
     check_horizon(settings.horizon_s, [name], others)
     job = ComparisonJob(
-        cars_of([architecture], settings), load_cycle(cycle), settings, None, others
-    )
+        cars_of([architecture], settings), load_cycle(cycle), settings, None, others,
+        None if cold_start is None else ColdStarts(cold_start),
+    )  # fmt: skip
     car, trace = job.cars.cars[0], job.trace
     if out is not None:
         check_outs({"--out": out}, job.inputs)
@@ -188,6 +195,8 @@ def run(
         case = prepared(trace)
         progress(f"{car.name}: {name}", 0, 1)
         row, plan, trajectory = solved(case)
+        if job.cold is not None:
+            job.cold.observe(case, row, plan, trajectory)
         shown = why_not_causal(case, name, plan, others)
     peeking = {} if shown is None else {(car.name, name): shown}
     comparison = study.Comparison(
