@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from hevopt.car.converter import Converter
 from hevopt.car.driveline import Driveline
 from hevopt.car.engine import Engine
 from hevopt.car.machine import Machine
@@ -16,6 +17,7 @@ from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
+from hevopt.problem.arrays import Array
 from hevopt.problem.battery import Battery
 from hevopt.problem.thresholds import Thresholds
 
@@ -45,6 +47,7 @@ class Architecture(Shown):
     files: where they were read from, the architecture first
     weighed: key of engine, machines and battery -> what each weighs and costs
     added_kg: of the vehicle's mass, what sizes have that changes made others
+    converter: between battery and bus; None where they are one
     """
 
     name: str
@@ -64,6 +67,7 @@ class Architecture(Shown):
     files: tuple[Path, ...]
     weighed: Mapping[str, Weighed] = field(default_factory=dict)
     added_kg: float = 0.0
+    converter: Converter | None = None
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -76,6 +80,10 @@ class Architecture(Shown):
             "gear": self.gear,
             "source": self.source,
         }
+
+    def terminal_w(self, bus_w: Array) -> Array:
+        """Power at the battery's terminals for one at the electric bus, > 0 out of the battery."""
+        return bus_w if self.converter is None else self.converter.terminal_w(bus_w)
 
     @property
     def electric(self) -> bool:

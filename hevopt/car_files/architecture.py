@@ -2,13 +2,28 @@
 
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, model_validator
 
 from hevopt.car.architecture import Function
 from hevopt.car.templates import COMPONENTS_OF
 from hevopt.car_files.driveline import CouplingFile
-from hevopt.car_files.fields import Description, Name, Named, NotNegative, Soc, Table
+from hevopt.car_files.fields import (
+    Description,
+    Fraction,
+    List,
+    Name,
+    Named,
+    NotNegative,
+    Number,
+    Shape,
+    Soc,
+    Table,
+)
 from hevopt.files.toml import FileModel
+
+# Points between which efficiency of a converter is looked at.
+_FINE = 2001
 
 
 def _names_a_file(table: dict[str, Any]) -> dict[str, Any]:
@@ -23,6 +38,37 @@ Component = Annotated[
     | Annotated[dict[str, Any], AfterValidator(_names_a_file), Table],
     Discriminator(lambda value: "a table" if isinstance(value, dict) else "a name"),
 ]
+
+
+class ConverterFile(FileModel):
+    """A converter between battery and bus: one efficiency, or several over the power at the bus."""
+
+    efficiency: Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape]
+    power_w: list[NotNegative] | None = None
+
+    @model_validator(mode="after")
+    def _points(self) -> Self:
+        """As many powers as efficiencies, and more out of the battery for more at the bus."""
+        if not isinstance(self.efficiency, list):
+            if self.power_w is not None:
+                raise ValueError("one efficiency needs no power_w; leave it out, or give a list")
+            return self
+        power, share = self.power_w, self.efficiency
+        if power is None or len(power) != len(share) or len(power) < 2:
+            raise ValueError(
+                f"efficiency has {len(share)} values; power_w needs as many, and at least 2"
+            )
+        if (np.diff(power) <= 0).any():
+            raise ValueError("power_w must increase")
+        fine = np.unique(np.append(np.linspace(0.0, power[-1], _FINE), power))
+        of_fine = np.interp(fine, power, share)
+        for passing in (fine / of_fine, fine * of_fine):
+            if (np.diff(passing) <= 0).any():
+                near = fine[int(np.argmin(np.diff(passing)))]
+                raise ValueError(
+                    f"efficiency changes so fast near {near:g} W that more power at the bus is less at the battery"
+                )
+        return self
 
 
 class RulesFile(FileModel):
@@ -72,6 +118,7 @@ class ArchitectureFile(FileModel):
     functions: list[Function]
     gear: Literal["cycle", "free"] = "cycle"
     rules: RulesFile | None = None
+    converter: ConverterFile | None = None
     coupling: CouplingFile
 
     @model_validator(mode="after")

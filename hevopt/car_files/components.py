@@ -5,6 +5,7 @@ from math import inf
 import numpy as np
 
 from hevopt.car.braking import Braking
+from hevopt.car.converter import Converter
 from hevopt.car.engine import Engine
 from hevopt.car.engine_laws import CompactLaw, EngineMap, FuelCoefficients, NoxCoefficients
 from hevopt.car.gear_loss import GearLoss, LossInGear
@@ -12,6 +13,7 @@ from hevopt.car.machine import Machine, TorqueCurve
 from hevopt.car.machine_laws import LossByCoefficients, LossByEfficiency, LossLaw, LossMap
 from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
+from hevopt.car_files.architecture import ConverterFile
 from hevopt.car_files.battery import BatteryFile, LinearVoltageFile
 from hevopt.car_files.car import BrakingFile, CarFile
 from hevopt.car_files.engine import EngineFile, EngineGridFile
@@ -176,6 +178,12 @@ def _loss_map(data: LossMapFile) -> LossMap:
         torque = np.concatenate([-torque[above][::-1], torque])
         loss = np.hstack([loss[:, above][:, ::-1], loss])
     return LossMap(np.array(data.speed_rpm) * TO_SI["_rpm"][1], torque, loss)
+
+
+def converter_of(data: ConverterFile) -> Converter:
+    if isinstance(data.efficiency, list):
+        return Converter(np.array(data.power_w), np.array(data.efficiency))
+    return Converter(np.array([0.0, 1.0]), np.array([data.efficiency] * 2))
 
 
 def battery_of(data: BatteryFile) -> Battery:

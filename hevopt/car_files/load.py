@@ -14,7 +14,14 @@ from hevopt.car.transmission import Gearbox
 from hevopt.car_files.architecture import ArchitectureFile, RulesFile
 from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
-from hevopt.car_files.components import battery_of, engine_of, gearbox_of, machine_of, vehicle_of
+from hevopt.car_files.components import (
+    battery_of,
+    converter_of,
+    engine_of,
+    gearbox_of,
+    machine_of,
+    vehicle_of,
+)
 from hevopt.car_files.driveline import CouplingFile
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
@@ -83,8 +90,8 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         gear="cycle",
         contents=contents,
         files=tuple(files),
-        weighed=sizes,
-        added_kg=more_kg,
+        weighed=sizes, added_kg=more_kg,
+        converter=None if data.converter is None else converter_of(data.converter),
     )  # fmt: skip
     return car.with_free_gear() if data.gear == "free" else car
 

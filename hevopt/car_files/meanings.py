@@ -24,7 +24,12 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "functions": ("", "what the hybrid may do; what is left out is forbidden to every strategy"),
         "gear": ("", 'who chooses the engine\'s gear: the cycle (or shift speeds), or "free": the strategy'),
         "rules": ("", "thresholds of the rules; what is left out is calibrated on the cycle"),
+        "converter": ("", "DC converter between battery and bus; without it they are one"),
         "coupling": ("", "how engine and machines join the wheels"),
+    },
+    "ConverterFile": {
+        "efficiency": ("-", "share of what it takes in, from either side; one value or a list over power_w"),
+        "power_w": ("W", "powers at the bus, of either sign, that efficiencies are given at"),
     },
     "RulesFile": {
         "electric_soc": ("-", "state of charge above which the car drives electrically"),

@@ -97,6 +97,8 @@ def _check(car: Architecture) -> None:
         lacking = f"it has {len(line.machines)} machines"
     elif len(_limited(line)) > 1 or any(box.choice == "free" for box in line.boxes):
         lacking = "more than one part follows a choice of its own"
+    elif car.converter is not None:
+        lacking = "a converter stands between its battery and the bus"
     elif car.vehicle.auxiliary_off_power_w is not None:
         lacking = "its electric load depends on the engine (auxiliary_off_power_w)"
     if lacking:

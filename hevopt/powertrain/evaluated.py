@@ -29,7 +29,7 @@ def evaluated(here: Setting, state: State, given: Mapping[str, Array], step_s: A
     flows, length_s = flowing(here, torques), step_s[here.shafts.step][:, None]
     battery = flows.machines_w + here.shafts.load_w[:, None]
     # What an alternator that follows its load leaves to the battery is rounding, not charge.
-    battery = np.where(np.abs(battery) < _ROUNDING_W, 0.0, battery)
+    battery = here.car.terminal_w(np.where(np.abs(battery) < _ROUNDING_W, 0.0, battery))
     reject = (
         bits(Reject.ENGINE_MAP, flows.off_engine_map)
         | bits(Reject.MACHINE_MAP, flows.off_machine_map)

@@ -65,7 +65,8 @@ class PowerFlows(Flows):
     @property
     def _names(self) -> tuple[str, ...]:
         own = (f"{name}_{what}" for name in self.machines for what in ("torque_nm", "speed_radps"))
-        return (*_NAMES, *own)
+        converter = ("converter_loss_w",) if self.car.converter is not None else ()
+        return (*_NAMES, *converter, *own)
 
     def cells(self, figures: TableFigures) -> SplitCells | None:
         return cells_of(self.branches, figures)
@@ -141,6 +142,9 @@ class PowerFlows(Flows):
                 found[name] = found[name] + np.where(
                     entering_w > 0, entering_w * (1 - eta), entering_w * (1 - 1 / eta)
                 )
+        if self.car.converter is not None:
+            bus_w = found["machine_electric_w"] + found["auxiliary_power_w"]
+            found["converter_loss_w"] = self.car.converter.loss_w(bus_w)
         for name in self.machines:
             none = np.zeros((1, 1))
             found[f"{name}_torque_nm"] = torques.get(name, none)

@@ -262,7 +262,7 @@ def most_nm(points: Gridded, stuck: Flags) -> tuple[Indices, Array]:
         given = {name: points.given[name][state] for name in way.chosen} | {way.slack: share * full}
         torques = completed(part, given)
         flows = flowing(part, torques)
-        battery_w = flows.machines_w + part.shafts.load_w[:, None]
+        battery_w = here.car.terminal_w(flows.machines_w + part.shafts.load_w[:, None])
         within = within_limits(here.car.battery, battery_w)
         again = points.repeats if len(points.repeats) == 1 else points.repeats[state]
         within = within & ~flows.off_engine_map & ~flows.off_machine_map & ~again

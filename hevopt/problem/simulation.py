@@ -142,6 +142,7 @@ def _residuals(
     if not table.flows:
         return residuals
     engine_w = f["engine_torque_nm"] * f["engine_speed_radps"]
+    converter_w = f["converter_loss_w"] if "converter_loss_w" in f else np.zeros_like(power_w)
     inertia_w = f["engine_inertia_w"] + f["machine_inertia_w"]
     lost_w = f["clutch_loss_w"] + f["gearbox_loss_w"] + f["gear_loss_w"] + f["brake_power_w"]
     switched_w = spun_w = np.zeros_like(power_w)
@@ -155,7 +156,7 @@ def _residuals(
         "engine": f["fuel_power_w"] - engine_w - f["engine_loss_w"],
         "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
         "driveline": engine_w + f["machine_power_w"] - inertia_w - lost_w - f["wheel_power_w"],
-        "electric bus": power_w - f["machine_electric_w"] - f["auxiliary_power_w"],
+        "electric bus": power_w - converter_w - f["machine_electric_w"] - f["auxiliary_power_w"],
         "whole car": f["fuel_power_w"]
         + f["battery_chemical_w"]
         - f["wheel_power_w"]
@@ -165,6 +166,7 @@ def _residuals(
         - lost_w
         - f["machine_loss_w"]
         - f["battery_loss_w"]
+        - converter_w
         + switched_w
         - spun_w,
     }

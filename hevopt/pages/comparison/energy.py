@@ -41,7 +41,7 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
     starts_j = float(np.sum(trajectory.switch_fuel_kg)) * heating_value_jpkg
     links = _links(trajectory, step_s, shafts)
     links[FUEL, STARTS] = starts_j - shafts.fuel_j
-    total = {name: float(np.sum(flow * step_s)) for name, flow in trajectory.flows.items()}
+    total = _total(trajectory, step_s)
     enough = _TINY * sum(abs(energy) for energy in links.values())
     wheel, battery = trajectory.flows["wheel_power_w"], trajectory.battery_power_w
     heat_j = links[ENGINE, ENGINE_LOSS]
@@ -135,12 +135,19 @@ def _links(trajectory: Trajectory, step_s: Array, shafts: _Shafts) -> dict[tuple
     return links
 
 
+def _total(trajectory: Trajectory, step_s: Array) -> dict[str, float]:
+    """Flow -> its energy over the cycle; what a converter loses is part of the battery's losses."""
+    total = {name: float(np.sum(flow * step_s)) for name, flow in trajectory.flows.items()}
+    return total | {"battery_loss_w": total["battery_loss_w"] + total.get("converter_loss_w", 0.0)}
+
+
 def _electric_links(add: Callable[[str, str, Array], None], trajectory: Trajectory) -> None:
     f, power = trajectory.flows, trajectory.battery_power_w
     electric, auxiliary = f["machine_electric_w"], f["auxiliary_power_w"]
     motoring, giving, taking = electric > 0, power > 0, power < 0
+    lost = f["battery_loss_w"] + f.get("converter_loss_w", np.zeros_like(power))
     covered = np.clip(-electric, 0, auxiliary)
-    add(DRAWN, BATTERY_LOSS, np.where(giving, f["battery_loss_w"], 0))
+    add(DRAWN, BATTERY_LOSS, np.where(giving, lost, 0))
     add(DRAWN, AUXILIARIES, np.where(giving, auxiliary - covered, 0))
     add(DRAWN, MOTOR, np.where(motoring, electric, 0))
     # A motor at nearly no torque can take power from both sides; what the shaft gives is lost there as well.
@@ -148,7 +155,7 @@ def _electric_links(add: Callable[[str, str, Array], None], trajectory: Trajecto
     add(MOTOR, MACHINE_LOSS, np.where(motoring, f["machine_loss_w"] - dragged, 0))
     add(GENERATOR, MACHINE_LOSS, np.where(motoring, 0, f["machine_loss_w"]))
     add(GENERATOR, AUXILIARIES, covered)
-    add(GENERATOR, BATTERY_LOSS, np.where(taking, f["battery_loss_w"], 0))
+    add(GENERATOR, BATTERY_LOSS, np.where(taking, lost, 0))
     add(GENERATOR, STORED, np.where(taking, -f["battery_chemical_w"], 0))
 
 

@@ -67,6 +67,8 @@ def check_car(car: Architecture) -> None:
         wrong = "its machine loses by a map or an efficiency; needed: kind loss"
     elif not _FUNCTIONS <= car.functions or car.gear != "cycle":
         wrong = "it lacks a function, or its gear is free"
+    elif car.converter is not None:
+        wrong = "a converter stands between battery and bus"
     elif car.vehicle.rolling_n[0] == 0.0:
         wrong = "its rolling resistance does not follow its mass"
     if wrong:
