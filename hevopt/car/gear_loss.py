@@ -8,6 +8,7 @@ between the points of its grid, and known nowhere beyond them; below the lowest 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,27 @@ from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+
+class Steep(NamedTuple):
+    """Where a loss rises with torque: row of its speed, the torque below and above, and Nm per Nm."""
+
+    row: int
+    low_nm: float
+    high_nm: float
+    rise: float
+
+
+def too_steep(torque_nm: Array, loss_nm: Array) -> Steep | None:
+    """The first place where a loss rises as fast as the torque: more at the input would give no more at the output.
+
+    torque_nm: (torque,) rising; loss_nm: (speed, torque), NaN where not measured. None where nowhere.
+    """
+    rise = np.diff(loss_nm, axis=1) / np.diff(torque_nm)
+    if not (rise >= 1).any():
+        return None
+    i, j = np.argwhere(rise >= 1)[0]
+    return Steep(int(i), float(torque_nm[j]), float(torque_nm[j + 1]), float(rise[i, j]))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -5,6 +5,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from hevopt.car.gear_loss import too_steep
 from hevopt.car_files.fields import (
     Curve,
     Fraction,
@@ -47,13 +48,12 @@ class GearLossFile(FileModel):
             if (np.diff(axis) <= 0).any():
                 raise ValueError(f"{name} must increase")
         check_grid("loss_nm", self.loss_nm, len(self.speed_rpm), len(self.torque_nm))
-        rise = np.diff(np.array(self.loss_nm), axis=1) / np.diff(self.torque_nm)
-        if (rise >= 1).any():
-            i, j = np.argwhere(rise >= 1)[0]
+        steep = too_steep(np.array(self.torque_nm), np.array(self.loss_nm))
+        if steep is not None:
             raise ValueError(
-                f"loss_nm at {self.speed_rpm[i]:g} rpm rises by {rise[i, j]:.3g} Nm per Nm between "
-                f"{self.torque_nm[j]:g} and {self.torque_nm[j + 1]:g} Nm: more torque at the input would give less "
-                "at the output; allowed: below 1"
+                f"loss_nm at {self.speed_rpm[steep.row]:g} rpm rises by {steep.rise:.3g} Nm per Nm between "
+                f"{steep.low_nm:g} and {steep.high_nm:g} Nm: more torque at the input would give less at the "
+                "output; allowed: below 1"
             )
         return self
 

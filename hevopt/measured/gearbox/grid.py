@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car.gear_loss import LossInGear
+from hevopt.car.gear_loss import LossInGear, too_steep
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.measured.clusters import clusters
@@ -93,13 +93,12 @@ def _row(torque: Array, loss: Array, axis: Array) -> Array:
 
 
 def _check_slope(data: LossInGear, number: int, place: str) -> None:
-    rise = np.diff(data.loss_nm, axis=1) / np.diff(data.torque_nm)
-    if (rise >= 1).any():
-        i, j = np.argwhere(rise >= 1)[0]
+    steep = too_steep(data.torque_nm, data.loss_nm)
+    if steep is not None:
         raise DataError(
-            f"{place}: gear {number} at {data.speed_radps[i] * RPM_PER_RADPS:.4g} rpm (input): between "
-            f"{data.torque_nm[j]:.4g} and {data.torque_nm[j + 1]:.4g} Nm the loss rises by more than the torque "
-            "itself; correct these points"
+            f"{place}: gear {number} at {data.speed_radps[steep.row] * RPM_PER_RADPS:.4g} rpm (input): between "
+            f"{steep.low_nm:.4g} and {steep.high_nm:.4g} Nm the loss rises by more than the torque itself; correct "
+            "these points"
         )
 
 
