@@ -109,6 +109,7 @@ class ArchitectureFile(FileModel):
     description: Description = ""
     car: Component
     engine: Component | None = None
+    source: Component | None = None
     gearbox: Component | None = None
     machine: Component | None = None
     machine_2: Component | None = None
@@ -124,9 +125,16 @@ class ArchitectureFile(FileModel):
     @model_validator(mode="after")
     def _components(self) -> Self:
         """The components are those of the coupling."""
-        keys = ("engine", "gearbox", "machine", "machine_2", "machine_3")
+        keys = ("engine", "source", "gearbox", "machine", "machine_2", "machine_3")
         given = {key for key in keys if getattr(self, key) is not None}
         kind = self.coupling.kind
+        if "source" in given:
+            if "engine" in given or kind != "series":
+                raise ValueError(
+                    "a source gives electricity alone: it takes the engine's place in coupling kind 'series', with "
+                    f"machine as its converter; found kind {kind!r}{' and an engine' if 'engine' in given else ''}"
+                )
+            given = given - {"source"} | {"engine"}
         if kind == "parts":
             geared = [part for part in self.coupling.parts or () if part.kind == "gearbox"]
             needed = {*self.coupling.shafts}

@@ -30,7 +30,7 @@ _EXPONENT_MAX = 700.0
 
 class FuelFile(FileModel):
     heating_value_mjpkg: Annotated[float, Field(ge=5, le=150)]
-    density_kgpl: Annotated[float, Field(ge=0.05, le=2)]
+    density_kgpl: Annotated[float, Field(ge=0.01, le=2)]
     co2_kgpkg: Annotated[float, Field(ge=0, le=5)]
 
 

@@ -27,6 +27,7 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.parts import driveline_of
+from hevopt.car_files.source import SourceFile, source_of
 from hevopt.car_files.weighing import WEIGHED, added_kg, resized, weighed
 from hevopt.errors import DataError
 from hevopt.files.keypaths import merged, with_changes
@@ -40,7 +41,7 @@ Built = TypeVar("Built")
 Given = TypeVar("Given")
 
 
-COMPONENTS = ("car", "engine", "gearbox", "machine", "machine_2", "machine_3", "battery")
+COMPONENTS = ("car", "engine", "source", "gearbox", "machine", "machine_2", "machine_3", "battery")
 MACHINES = ("machine", "machine_2", "machine_3")
 
 
@@ -71,7 +72,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     pack = part("battery", BatteryFile, lambda file: (battery_of(file), file.soc))
     gearbox = part("gearbox", GearboxFile, gearbox_of)
     bare = part("car", CarFile, lambda file: partial(vehicle_of, file))
-    engine = part("engine", EngineFile, engine_of)
+    engine = part("engine", EngineFile, engine_of) or part("source", SourceFile, source_of)
     machines = {key: part(key, MachineFile, machine_of) for key in MACHINES}
     sizes = {key: weighed(file) for key, file in files_of.items() if key in WEIGHED}
     more_kg = _added_kg(path, changes or {}, sizes)

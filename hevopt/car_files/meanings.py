@@ -15,6 +15,7 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "description": ("", "one line about the architecture, shown in the list"),
         "car": ("", "car without powertrain"),
         "engine": ("", "combustion engine"),
+        "source": ("", "source of electricity in its place, such as a fuel cell; kind series"),
         "gearbox": ("", "gearbox with final drive and shift speeds"),
         "machine": ("", "electric machine with its inverter"),
         "machine_2": ("", "another one"),
@@ -151,6 +152,15 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "displacement": ("-", _ONE_FACTOR),
         "torque": ("-", _ONE_FACTOR),
         "power": ("-", _ONE_FACTOR),
+    },
+    "SourceFile": {
+        "name": _NAME,
+        "power_kw": ("kW", "powers that it gives, from 0 up"),
+        "fuel_gps": ("g/s", "fuel at each of them, its own needs included"),
+        "start_fuel_g": ("g", "fuel of one start"),
+        "least_on_s": ("s", "least time on, once started"),
+        "least_off_s": ("s", "least time off, once stopped"),
+        "fuel": ("", "what is burnt, such as hydrogen"),
     },
     "FuelFile": {
         "heating_value_mjpkg": ("MJ/kg", "lower heating value"),

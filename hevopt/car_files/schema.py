@@ -15,6 +15,7 @@ from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.load import kind_of
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.meanings import MEANINGS
+from hevopt.car_files.source import SourceFile
 from hevopt.errors import unknown_name
 from hevopt.files.toml import FileModel
 
@@ -29,6 +30,7 @@ MODELS: dict[str, type[FileModel]] = {
     "architecture": ArchitectureFile,
     "car": CarFile,
     "engine": EngineFile,
+    "source": SourceFile,
     "gearbox": GearboxFile,
     "machine": MachineFile,
     "battery": BatteryFile,

@@ -109,7 +109,7 @@ def test_a_measured_map_is_copied_cell_by_cell(tmp_path):
         (
             "mine",
             {"components": ["motor"]},
-            "available: car, engine, gearbox, machine, machine_2, machine_3, battery, all",
+            "available: car, engine, source, gearbox, machine, machine_2, machine_3, battery, all",
         ),
         ("mine", {"out": Path("mine.txt")}, "an architecture is a .toml file"),
     ],
