@@ -58,6 +58,12 @@ class Scope(StrEnum):
     CONTINUOUS = "continuous split"
 
 
+SCOPE_WORDS: dict[str, str] = {
+    Scope.TABULATED: "the levels of a joint alone",
+    Scope.CONTINUOUS: "every torque between the levels of a joint",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Claim:
     """What a bound is. Text of results saved by another version may name a proof that this one does not know."""

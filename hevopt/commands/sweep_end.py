@@ -2,6 +2,7 @@
 
 import tomllib
 from pathlib import Path
+from shlex import quote
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -38,8 +39,8 @@ def end(store: Path, done: "Advance | None", export: Path | None) -> None:
         write(f"stopped; all results there are lie in {store}; the same command goes on from there")
         raise typer.Exit(PARTLY)
     write(
-        f"results in {store}\n  as a table: hevopt sweep --store {store} --export FILE.csv\n"
-        f"  as a page:  hevopt report {store} --out PAGE.html"
+        f"results in {store}\n  as a table: hevopt sweep --store {quote(str(store))} --export FILE.csv\n"
+        f"  as a page:  hevopt report {quote(str(store))} --out PAGE.html"
     )
     if counts["failed"]:
         write("--retry-failed runs failed cases once more")

@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.bounds.certificate import Scope
+from hevopt.bounds.certificate import SCOPE_WORDS
 from hevopt.files.shown import printable
 from hevopt.output.tables import needed_width, titled_table
 from hevopt.problem.problem import Plan
@@ -72,12 +72,6 @@ _COLUMNS = (
 # Only where another end charge than the start's is asked; before the corrected fuel.
 _BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", "z.2f"), 0)
 _BATTERY_PLACE = 7
-
-
-_SCOPES: dict[str, str] = {
-    Scope.CONTINUOUS: ", every torque between the levels of a joint",
-    Scope.TABULATED: ", the levels of a joint alone",
-}
 
 
 def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
@@ -167,8 +161,7 @@ def comparison_notes(comparison: Comparison) -> str:
         f"{_end_notes(comparison)}"
         f"bound: no plan with that row's end charge has less {objective}; gap: how far the row is above it.\n"
         f"{_scope_note(comparison)}"
-        f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
-        f"{_peeking_note(comparison)}"
+        f"{_causal_note(comparison)}"
         "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
         "lower-bound DP = a cost-to-go nowhere above the true one.\n"
         f"The engine is warm from start to end; gears: {gears}; figures are of this cycle alone."
@@ -201,7 +194,7 @@ def _scope_note(comparison: Comparison) -> str:
             named = cars.setdefault(str(row.certificate.scope), [])
             named += [] if row.architecture in named else [row.architecture]
     texts = [
-        f"{scope}{_SCOPES.get(scope, '')}"
+        ", ".join(filter(None, (scope, SCOPE_WORDS.get(scope))))
         + (f": {', '.join(map(printable, names))}" if len(cars) > 1 else "")
         for scope, names in cars.items()
     ]
@@ -228,9 +221,11 @@ def _end_notes(comparison: Comparison) -> str:
     )
 
 
-def _peeking_note(comparison: Comparison) -> str:
-    """What shows that strategies know more of the cycle than they say, so that they are not marked."""
-    return "".join(
+def _causal_note(comparison: Comparison) -> str:
+    """What the mark says, where a row has it, and why rows that claim to be causal have not."""
+    marked = any(row.strategy in comparison.causal for row in comparison.rows)
+    note = f"{_CAUSAL_MARK}: causal, decides without knowing the rest of the cycle.\n"
+    return (note if marked else "") + "".join(
         f"not causal, {printable(f'{row}: {why}')}.\n"
         for row, why in comparison.peeking_by_row.items()
     )

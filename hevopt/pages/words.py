@@ -8,7 +8,7 @@ WORDS = {
     "tabulated controls": "the torques, gears and clutches that the table of the car lists for each step, "
     "by default 41 torques for each gear and machine",
     "charge-corrected": "fuel less what stored energy beyond that asked at the end is worth",
-    "proven lower bound": "a figure that no plan over the tabulated controls can undercut, whatever the strategy",
+    "proven lower bound": "a figure that no plan can undercut, whatever the strategy; over which controls is told",
     "one multiplier": "a bound by one price of stored energy over the whole cycle",
     "costate prices": "a bound by a price of stored energy for each step, along the best plan found",
     "LP prices": "a bound by a price of stored energy for each step, from a linear program",

@@ -75,7 +75,7 @@ def help_of(architecture: Architecture, found: Paths, speed_mps: float) -> Helpe
         elif any(found.machines):
             why = "in this gear and at this speed its machine would turn faster than it may"
         raise DataError(
-            f"{architecture.source}: {why}; choose a car whose machine may help, such as C2, or leave --e-boost out"
+            f"{architecture.name}: {why}; choose a car whose machine may help, such as C2, or leave --e-boost out"
         )
     machine, radius = architecture.machines[n], architecture.vehicle.tyre_radius_m
     top = machine.speed_max_radps if np.isfinite(machine.speed_max_radps) else _FASTEST_RADPS

@@ -72,6 +72,12 @@ def test_a_pipe_gets_no_blanks_at_the_ends_of_lines(seen):
         assert not [line for line in seen(columns).split("\n") if line != line.rstrip()]
 
 
+def test_the_mark_of_causal_rows_is_explained_where_a_row_has_it(seen, monkeypatch, capsys):
+    assert "baseline†" in seen(None) and "†: causal" in seen(None)
+    words = ("compare", "--architectures", "C2", "--strategies", "dp")
+    assert "†" not in call(monkeypatch, capsys, *words).out
+
+
 def test_a_failed_row_is_one_word_where_it_is_narrow(seen):
     rows = [line for line in table_of(seen(80)) if line.startswith(" A ")]
     assert len(rows) == 3 and all(line.endswith("failed") for line in rows)

@@ -87,6 +87,14 @@ def _span(values: list[float], form: str) -> str:
     return " to ".join(ends)
 
 
+def _by_cars(said: list[tuple[str, str]]) -> list[str]:
+    """A line for each thing said, after the names of all cars that it is said of."""
+    cars: dict[str, list[str]] = {}
+    for name, text in said:
+        cars.setdefault(text, []).append(name)
+    return [f"{', '.join(names)}: {text}" for text, names in cars.items()]
+
+
 def _starts(known: list[_Known]) -> Assumption:
     lines = []
     for name, _, about, rows in known:
@@ -99,12 +107,15 @@ def _starts(known: list[_Known]) -> Assumption:
             shares.append(100 * (started_j + spun_j) / fuel_j if fuel_j > 0 else 0.0)
         if max(counts):
             lines.append(
-                f"{name}: {about.start_fuel_kg * 1e3:g} g a start; {_span(counts, '.0f')} starts, with spin-up not "
-                f"regained, are {_span(shares, '.1f')} % of the fuel's energy"
+                (
+                    name,
+                    f"{about.start_fuel_kg * 1e3:g} g a start; {_span(counts, '.0f')} starts, with spin-up not "
+                    f"regained, are {_span(shares, '.1f')} % of the fuel's energy",
+                )
             )
     return Assumption(
         "A start costs fuel and spins the engine up, but no time, comfort or wear.",
-        lines,
+        _by_cars(lines),
         "too good",
     )
 
@@ -150,7 +161,7 @@ def _gears(known: list[_Known]) -> Assumption:
     lines = []
     for name, _, about, rows in known:
         changes = [float(_changes(row)) for row in rows]
-        text = f"{name}: {_FROM[about.gears]}"
+        text = _FROM[about.gears]
         if about.gears != "none":
             gap = (
                 f"{about.shift_gap_s:g} s without torque each"
@@ -158,11 +169,11 @@ def _gears(known: list[_Known]) -> Assumption:
                 else "under load"
             )
             text += f"; {_span(changes, '.0f')} changes, {gap}"
-        lines.append(text)
+        lines.append((name, text))
     return Assumption(
         "Gears are not part of what is optimised, but where they are chosen with the plan; a manual gearbox "
         "interrupts.",
-        lines,
+        _by_cars(lines),
         "either; --free-gear and --set gearbox.shift_gap_s=0 tell what it is worth",
     )
 

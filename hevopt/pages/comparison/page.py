@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+from hevopt.bounds.certificate import SCOPE_WORDS
 from hevopt.pages.comparison.alerts import alerts
 from hevopt.pages.comparison.assumptions import assumptions
 from hevopt.pages.comparison.results import Item, Results, SavedRow, Sensitivity
@@ -42,7 +43,9 @@ def comparison_page(results: Results) -> str:
             if car.about is not None
         ],
         assumptions=assumptions(results),
-        table=[_figures(row) for row in results.rows],
+        table=[_figures(results, row) for row in results.rows],
+        scope=_scope(results),
+        scope_words=SCOPE_WORDS,
         worth=[_worth(results, row) for row in results.rows if row.detail is not None],
         energy=[_BalanceTable.of(results, row) for row in results.rows if row.detail is not None],
         spells=[_spells(row) for row in results.rows if row.detail is not None],
@@ -70,7 +73,14 @@ def _left_out(results: Results) -> list[str]:
     return [text for text, found in options if not found]
 
 
-def _figures(row: SavedRow) -> dict[str, Any]:
+def _scope(results: Results) -> str:
+    """What all bounds of the table speak of; empty where they differ, or are not known."""
+    claims = [row.figures.certificate for row in results.rows if row.figures.certificate]
+    scopes = {str(claim.scope) for claim in claims}
+    return scopes.pop() if len(scopes) == 1 and scopes <= set(SCOPE_WORDS) else ""
+
+
+def _figures(results: Results, row: SavedRow) -> dict[str, Any]:
     """The row's figures, and what is derived from them for the table."""
     figures = row.figures
     derived: dict[str, Any] = {"co2_corrected_g_per_km": None, "delta_soc": None}
@@ -79,7 +89,8 @@ def _figures(row: SavedRow) -> dict[str, Any]:
         derived["co2_corrected_g_per_km"] = figures.co2_g_per_km * share
     if figures.soc_end is not None:
         derived["delta_soc"] = figures.soc_end - figures.soc_start
-    proof = "" if figures.certificate is None else str(figures.certificate)
+    claim = figures.certificate
+    proof = "" if claim is None else str(claim.proof if _scope(results) else claim)
     return figures.model_dump() | derived | {"proof": proof, "solved": row.detail is not None}
 
 

@@ -10,6 +10,8 @@ from hevopt.studies.rows import end_asked_text, marked
 # Rows that differ by less than this are called equal.
 _EQUAL_PERCENT = 0.05
 _NOTHING_L_PER_100KM = 1e-9
+# The strategy of cars that leave no choice.
+_NO_CHOICE = "baseline"
 # No line ends between a number and its unit.
 _PERCENT = "\u00a0%"
 _VOLUME = "\u00a0l/100\u00a0km"
@@ -152,8 +154,15 @@ def _second(results: Results, best: RowFigures) -> str:
 def _causal(results: Results, equal: list[RowFigures]) -> list[str]:
     """The best row that decides without knowing the rest of the cycle, beside the best of all."""
     rows = [row.figures for row in results.rows if row.detail is not None]
-    follows = (r for r in rows if not (r.status.others or r.status.shortfall_steps))
-    causal = [row for row in follows if row.strategy in results.causal]
+    causal = [row for row in rows if row.strategy in results.causal]
+    # Where there is nothing to decide, nothing need be known.
+    deciding = [row for row in causal if row.strategy != _NO_CHOICE or row in equal]
+    if causal and not deciding:
+        return [
+            "No strategy here that has a choice is causal, deciding without knowing the rest of the cycle; "
+            "hevopt strategies lists those that are."
+        ]
+    causal = [row for row in deciding if not (row.status.others or row.status.shortfall_steps)]
     if not causal:
         return []
     own = min(causal, key=_corrected)

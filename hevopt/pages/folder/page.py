@@ -63,9 +63,16 @@ def _by_cycle(found: list[SavedComparison]) -> list[tuple[str, list[SavedCompari
     return [(cycle, list(own)) for cycle, own in groupby(ordered, key=lambda s: s.cycle)]
 
 
+def _by_car(own: list[SavedComparison]) -> list[str]:
+    """The rows of all comparisons, those of a car together, cars and rows in the order that they first stand in."""
+    car_of = {name: row.architecture for saved in own for name, row in saved.rows.items()}
+    cars = list(dict.fromkeys(car_of.values()))
+    return sorted(car_of, key=lambda name: cars.index(car_of[name]))
+
+
 def _group(cycle: str, own: list[SavedComparison]) -> dict[str, object]:
     """The comparisons of a cycle side by side, and each against the one before it."""
-    names = dict.fromkeys(name for saved in own for name in saved.rows)
+    names = _by_car(own)
     return {
         "cycle": cycle,
         "saved": own,

@@ -147,9 +147,7 @@ def _plane_words(
                 "it bounds the sum, neither fuel nor NOx alone."
             )
         else:
-            words.append(
-                "With weight 0 alone it is the least fuel of any design, and says nothing about NOx."
-            )
+            words.append("It is the least fuel of any design, and says nothing about NOx.")
         words.append(
             "It holds for plans that leave at least the charge that the cases left, charge-corrected as they are."
         )

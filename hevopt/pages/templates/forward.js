@@ -47,9 +47,9 @@
     const rows = data.audit.filter(([, kj]) => Math.abs(kj) > 0.0005).sort((a, b) => a[1] - b[1]).reverse();
     const most = Math.max(...rows.map(([, kj]) => Math.abs(kj)));
     return { data: [{ type: "bar", orientation: "h", y: rows.map(([name]) => plain(name)), x: rows.map(([, kj]) => kj), marker: { color: rows.map(([, kj]) => look.colours[kj > 0 ? 3 : 5]) },
-      text: rows.map(([, kj]) => kj.toFixed(1)), textposition: "outside", cliponaxis: false, hovertemplate: "%{y}: %{x:.2f} kJ<extra></extra>" }],
+      text: rows.map(([, kj]) => kj.toFixed(1).replace("-", "−")), textposition: "outside", cliponaxis: false, hovertemplate: "%{y}: %{x:.2f} kJ<extra></extra>" }],
       least: 480, layout: layout(look, width, { margin: { l: 10, r: 60, t: 10, b: 44 }, showlegend: false,
-        xaxis: axis(look, "energy (kJ)", { range: [-1.2 * most, 1.2 * most] }), yaxis: axis(look, "", { autorange: "reversed", ticks: "" }) }) };
+        xaxis: axis(look, "energy (kJ)", { range: [-1.2 * most, 1.2 * most], exponentformat: "none", separatethousands: false, nticks: 6 }), yaxis: axis(look, "", { autorange: "reversed", ticks: "" }) }) };
   }
 
   Page.start((found) => {

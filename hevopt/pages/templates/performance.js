@@ -4,6 +4,7 @@
 (() => {
   const { byId, axis, layout, figure, draw, plain } = Page;
   const HUES = [5, 1, 3, 6, 2, 4, 8, 7, 0];
+  const SPEED_MAX = 240, LABEL_SHARE = 0.042; // km/h; height of a label by that of the figure
   let data, chosen = 0;
 
   const of = (look, n) => look.colours[HUES[n % HUES.length]];
@@ -21,18 +22,31 @@
       xaxis: axis(look, "time (s)", { anchor: "y2", rangemode: "tozero", zeroline: false }) }) };
   }
 
+  // Where on a slope's line its name, on it, is crossed by no other line, as far to the right as there is such a place; -1: nowhere.
+  function clear(car, force, most, width) {
+    const last = SPEED_MAX * (1 - 18 / (width - 72)), half = 18 * SPEED_MAX / (width - 72);
+    const others = [...car.forces, ...car.against.map(([, other]) => other).filter((other) => other !== force), car.speed.map(() => car.grip)];
+    for (let at = force.length - 1; at > 0; at -= 1) {
+      const low = force[at] - LABEL_SHARE * most / 2, high = low + LABEL_SHARE * most;
+      if (car.speed[at] > last || high > most) continue;
+      const near = (n) => Math.abs(car.speed[n] - car.speed[at]) <= half;
+      if (others.every((other) => other.every((value, n) => value === null || !near(n) || value < low || value > high))) return at;
+    }
+    return -1;
+  }
+
   function forces(look, width) {
     const car = data.cars[chosen], traces = [], notes = [];
     car.forces.forEach((force, n) => traces.push(line(car.speed, force, `gear ${n + 1}`, of(look, n), { line: { width: 2 } })));
     const most = 1.06 * Math.max(car.grip, ...car.forces.flat().filter((value) => value !== null));
     car.against.forEach(([slope, force]) => {
       traces.push(line(car.speed, force, `${100 * slope} %`, look.muted, { showlegend: false, line: { width: 1 } }));
-      const at = Math.max(force.findIndex((value) => value > most) - 6, 0) || Math.round(0.62 * force.length);
-      if (force[at] < most) notes.push({ x: car.speed[at], y: force[at], text: `${100 * slope} %`, showarrow: false, yshift: 9, font: { size: 11, color: look.muted } });
+      const at = clear(car, force, most, width);
+      if (at >= 0) notes.push({ x: car.speed[at], y: force[at], text: `${100 * slope} %`, showarrow: false, bgcolor: look.paper, borderpad: 0, font: { size: 11, color: look.muted } });
     });
     traces.push(line([car.speed[0], car.speed[car.speed.length - 1]], [car.grip, car.grip], "grip", look.ink, { line: { dash: "dash", width: 1.2 } }));
     return { data: traces, layout: layout(look, width, { hovermode: "closest", annotations: notes, margin: { l: 58, r: 14, t: 12, b: 46 },
-      xaxis: axis(look, "speed (km/h)", { range: [0, 240], zeroline: false }), yaxis: axis(look, "force at the tyres (kN)", { range: [0, most] }) }) };
+      xaxis: axis(look, "speed (km/h)", { range: [0, SPEED_MAX], zeroline: false }), yaxis: axis(look, "force at the tyres (kN)", { range: [0, most] }) }) };
   }
 
   Page.start((found) => {

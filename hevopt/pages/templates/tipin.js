@@ -70,12 +70,13 @@
     traces.push({ type: "scatter", mode: "lines", x: surge.flow, y: surge.ratio, name: "surge line", line: { color: look.colours[1], width: 2.4 }, hoverinfo: "skip" });
     traces.push({ type: "scatter", mode: "lines", x: c.flow, y: c.ratio, name: plain(c.label), line: { color: look.colours[5], width: 2.6 }, customdata: c.t, hovertemplate: "%{customdata:.2f} s: %{x:.1f} g/s, %{y:.2f}<extra></extra>" });
     const at = data.marked.map((t) => c.t.findIndex((own) => own >= t - 1e-9)).filter((n) => n >= 0);
-    traces.push({ type: "scatter", mode: "markers+text", x: at.map((n) => c.flow[n]), y: at.map((n) => c.ratio[n]), text: data.marked.map((t) => `${t} s`), textposition: "bottom right", textfont: { size: 11, color: look.colours[5] }, marker: { size: 7, color: look.colours[5] }, showlegend: false, hoverinfo: "skip" });
+    traces.push({ type: "scatter", mode: "markers", x: at.map((n) => c.flow[n]), y: at.map((n) => c.ratio[n]), marker: { size: 7, color: look.colours[5] }, showlegend: false, hoverinfo: "skip" });
     const named = [...lines.map((one) => ({ x: one.flow[one.flow.length - 1], y: one.ratio[one.ratio.length - 1], yshift: -9, text: `${one.krpm}`, colour: look.muted })),
-      ...islands.map((island) => ({ x: island.flow[island.flow.length - 1], y: island.ratio[island.ratio.length - 1], yshift: 0, text: `${Math.round(100 * island.level)} %`, colour: look.colours[3] }))];
+      ...islands.map((island) => ({ x: island.flow[island.flow.length - 1], y: island.ratio[island.ratio.length - 1], yshift: 0, text: `${Math.round(100 * island.level)} %`, colour: look.colours[3] })),
+      ...at.map((n, k) => ({ x: c.flow[n], y: c.ratio[n], xshift: 17, yshift: -10, text: `${data.marked[k]} s`, colour: look.colours[5] }))];
     const most = Math.max(...c.ratio, ...lines[lines.length - 1].ratio);
     return { data: traces, layout: layout(look, width, { hovermode: "closest", margin: { l: 58, r: 14, t: 12, b: 48 },
-      annotations: named.map(({ x, y, yshift, text, colour }) => ({ x, y, yshift, text, showarrow: false, font: { size: 10.5, color: colour }, bgcolor: `${look.paper}cc` })),
+      annotations: named.map(({ x, y, xshift = 0, yshift, text, colour }) => ({ x, y, xshift, yshift, text, showarrow: false, font: { size: 10.5, color: colour }, bgcolor: `${look.paper}cc` })),
       xaxis: axis(look, "corrected flow (g/s)", { rangemode: "tozero", zeroline: false }), yaxis: axis(look, "pressure ratio (–)", { range: [0.93, most * 1.03], zeroline: false }) }) };
   }
 

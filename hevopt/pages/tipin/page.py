@@ -5,6 +5,7 @@ import json
 from collections.abc import Mapping, Sequence
 
 from hevopt.errors import HevoptError
+from hevopt.files.lookup import without_folders
 from hevopt.mean_value.balances import balances
 from hevopt.pages.alert import Alert
 from hevopt.pages.render import render
@@ -105,6 +106,7 @@ def _alerts(found: Sequence[TipIn], failed: Mapping[str, HevoptError]) -> list[A
         for b in balances(t.run)
         if abs(b.residual) > _SMALL_RESIDUAL
     ]
+    lost = [f"{label}: {without_folders(str(error))}" for label, error in failed.items()]
     worth = [
         "no measured map, inertia, boost or tip-in of the shipped engines is public: a comparison of models"
     ]
@@ -113,7 +115,7 @@ def _alerts(found: Sequence[TipIn], failed: Mapping[str, HevoptError]) -> list[A
         Alert("Surge", bool(surging), surging or ["flow stays above that at surge"]),
         Alert("Steady reference", bool(short), short or ["settled full load is the file's to 3 %"], grave=False),
         Alert("Balances", bool(open_balances), open_balances or ["mass, burnt mass, energy and rotor work close"]),
-        Alert("Failed cases", bool(failed), [f"{k}: {v}" for k, v in failed.items()] or ["every case was driven"]),
+        Alert("Failed cases", bool(failed), lost or ["every case was driven"]),
         Alert("What it is worth", True, worth, grave=False),
     ]  # fmt: skip
 

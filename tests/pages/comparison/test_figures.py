@@ -238,6 +238,13 @@ def test_nothing_that_matters_lies_behind_a_scroll_at_1200_px(shown):
     page.set_viewport_size({"width": 1200, "height": 1400})
     drawn = "[...document.querySelectorAll('figure:not([hidden]) .plot')].every(p => p._fullLayout.width < 1200)"
     until(page, drawn)
+    # One line a row, what all bounds speak of being said once below.
+    low = "[...document.querySelectorAll('#comparison tbody tr')].map(row => row.offsetHeight)"
+    assert (
+        max(page.evaluate(low)) < 30
+        and "continuous split" not in page.locator("#comparison").inner_text()
+    )
+    assert "All bounds here: continuous split, every torque" in page.locator("#table").inner_text()
     wide = page.evaluate(
         "[...document.querySelectorAll('.scroll, .plot')].filter(s => s.offsetParent)"
         ".filter(s => s.scrollWidth > s.clientWidth)"

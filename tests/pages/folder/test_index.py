@@ -8,6 +8,7 @@ from page_helpers import Opened
 
 from hevopt.pages.comparison.results import Results
 from hevopt.pages.folder.differences import differences, moved, rows_apart, saved_comparison
+from hevopt.pages.folder.page import _by_car
 
 
 def small(nedc, change=lambda contents: None):
@@ -55,6 +56,14 @@ def test_what_differs_is_named_and_what_does_not_is_not(nedc):
     weighted = saved_comparison("3", small(nedc, lambda c: c.update(nox_weight=5.0)))
     assert moved(one, weighted) == []
     assert ("setting", "weight on NOx", "0", "5") in differences(one, weighted)
+
+
+def test_rows_of_a_car_stand_together(nedc):
+    def other(contents):
+        contents["rows"][0]["figures"]["strategy"] = "mine"
+
+    both = [saved_comparison("1", small(nedc)), saved_comparison("2", small(nedc, other))]
+    assert _by_car(both) == ["A baseline", "A mine", "C2 conventional", "C2 dp"]
 
 
 def test_report_of_a_folder_writes_its_index(monkeypatch, capsys, folder, tmp_path, browser, nedc):
