@@ -65,6 +65,7 @@ TESTS = [
     "tests/output",
     "tests/files",
     "tests/problem",
+    "tests/gym",
     "tests/sweeps/store",
     "tests/pages/test_browser.py",
     "tests/sweeps/workers/test_backends.py",

@@ -38,14 +38,21 @@ class Prescribed(Shown):
 
 def driven(problem: Problem, stepper: Stepper, steps: int | None = None) -> tuple[Indices, float]:
     """(time,) controls of a stepper that drives the problem, or its first steps, and the stored energy left."""
-    table, battery = problem.table, problem.battery.arrays
+    table = problem.table
     control = np.empty(len(table.time_s) if steps is None else steps, dtype=np.int64)
-    energy_j, before = problem.start_j, problem.start_mode
+    energy_j, mode = problem.start_j, problem.start_mode
     for k in range(len(control)):
-        chosen = control[k] = stepper.decide(k, energy_j, before)
-        mode = int(table.mode[chosen])
-        between_j = energy_j - float(at_step(table.switch_energy_j, k)[before, mode])
-        power_w, step_s = float(table.battery_power_w[k, chosen]), float(table.step_s[k])
-        energy_j = between_j - step_s * chemical_power_at(power_w, between_j, battery)
-        before = mode
+        control[k] = stepper.decide(k, energy_j, mode)
+        energy_j, mode = stepped(problem, k, energy_j, mode, int(control[k]))
     return control, energy_j
+
+
+def stepped(
+    problem: Problem, k: int, energy_j: float, mode: int, control: int
+) -> tuple[float, int]:
+    """Stored energy and mode after a control at step k; energy_j, mode: those before it."""
+    table, battery = problem.table, problem.battery.arrays
+    after = int(table.mode[control])
+    between_j = energy_j - float(at_step(table.switch_energy_j, k)[mode, after])
+    power_w, step_s = float(table.battery_power_w[k, control]), float(table.step_s[k])
+    return between_j - step_s * chemical_power_at(power_w, between_j, battery), after
