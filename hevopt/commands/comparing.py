@@ -218,7 +218,7 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
     show(rows)
     left = report.left_out(rows)
     notes = [f"left out for want of width: {', '.join(left)}; --wide shows them."] if left else []
-    show_notes("\n".join([*notes, report.comparison_notes(comparison), *job.cars.said()]))
+    show_notes("\n".join([*notes, report.comparison_notes(comparison, left), *job.cars.said()]))
     if job.cold is not None and job.cold.figures:
         from hevopt.output.cold_tables import cold_table
 
@@ -230,13 +230,13 @@ def show_comparison(
 ) -> None:
     """Print the rows as a table with notes and published figures, or as JSON."""
     from hevopt.output import file_tables as outputs
-    from hevopt.output import terminal_tables as report
+    from hevopt.output.beside_tables import published_table
 
     if json:
         write(outputs.result_json(comparison, job.about))
         return
     show_rows(job, comparison, wide=wide)
     write("")
-    published = report.published_table(comparison) if job.is_study else None
+    published = published_table(comparison, None if wide else width()) if job.is_study else None
     if published is not None:
         show(published)

@@ -40,6 +40,7 @@ GROUPS: Sequence[HelpGroup] = (
             "sweep": "hevopt sweep study.toml",
             "pareto": "hevopt pareto C2",
             "sensitivity": "hevopt sensitivity C2 --strategies dp",
+            "size": "hevopt size study.toml",
         },
     ),
     HelpGroup(
@@ -48,6 +49,7 @@ GROUPS: Sequence[HelpGroup] = (
             "report": "hevopt report nedc.json.gz --out nedc.html",
             "reproduction": "hevopt reproduction --out reproduction.md",
             "turbo-lag": "hevopt turbo-lag --out turbo_lag.md",
+            "validation": "hevopt validation --out validation.md",
         },
     ),
     HelpGroup(

@@ -167,7 +167,7 @@ def run(
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
     from hevopt.output import file_tables as outputs
-    from hevopt.output import terminal_tables as report
+    from hevopt.output.beside_tables import calibration_table, thresholds_line
     from hevopt.studies import comparison as study
     from hevopt.studies.by_car import lost_proofs
     from hevopt.studies.cars import cars_of
@@ -216,11 +216,11 @@ def run(
         write(outputs.result_json(comparison, job.about))
         return
     show_rows(job, comparison, wide=wide)
-    calibration = report.calibration_table(plan)
+    calibration = calibration_table(plan)
     if calibration is not None:
         show(calibration)
     if "thresholds" in plan.notes:
-        write(report.thresholds_line(plan.notes["thresholds"]))
+        write(thresholds_line(plan.notes["thresholds"]))
     if out is not None:
         write(f"trajectory written to {out}")
 

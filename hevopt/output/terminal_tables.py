@@ -1,21 +1,16 @@
-"""Tables for the terminal: a comparison, the published figures beside it, the calibration of a rule."""
+"""The table of a comparison for the terminal, and the notes below it."""
 
-from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Collection, Sequence
+from typing import Literal, NamedTuple
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.bounds.certificate import SCOPE_WORDS
+from hevopt.bounds.certificate import SCOPE_WORDS, Proof
 from hevopt.files.shown import printable
 from hevopt.output.tables import needed_width, titled_table
-from hevopt.problem.problem import Plan
-from hevopt.reproduction.published import published_beside
 from hevopt.studies.comparison import Comparison
 from hevopt.studies.rows import Row, end_asked_text, marked, no_reference_text
-from hevopt.units import KMH_PER_MPS
 
 _CAUSAL_MARK = "†"
 
@@ -72,6 +67,12 @@ _COLUMNS = (
 # Only where another end charge than the start's is asked; before the corrected fuel.
 _BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", "z.2f"), 0)
 _BATTERY_PLACE = 7
+_PROOFS = {
+    Proof.ONE_MULTIPLIER: "one price on stored energy",
+    Proof.COSTATE_PRICES: "one price per step, along the best plan found",
+    Proof.LP_PRICES: "one price per step, of a linear program",
+    Proof.LOWER_BOUND_DP: "a cost-to-go nowhere above the true one",
+}
 
 
 def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
@@ -147,8 +148,8 @@ def _table(comparison: Comparison, columns: Sequence[_Column], *, brief: bool = 
     return table
 
 
-def comparison_notes(comparison: Comparison) -> str:
-    """What the columns mean, below the table."""
+def comparison_notes(comparison: Comparison, left: Collection[str] = ()) -> str:
+    """What the columns mean, below the table; left: heads of those that have left it."""
     objective = "fuel"
     if comparison.nox_weight:
         objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
@@ -162,8 +163,7 @@ def comparison_notes(comparison: Comparison) -> str:
         f"bound: no plan with that row's end charge has less {objective}; gap: how far the row is above it.\n"
         f"{_scope_note(comparison)}"
         f"{_causal_note(comparison)}"
-        "proof: one multiplier = one price on stored energy; costate prices, LP prices = one per step; "
-        "lower-bound DP = a cost-to-go nowhere above the true one.\n"
+        f"{'' if 'proof' in left else _proof_note(comparison)}"
         f"The engine is warm from start to end; gears: {gears}; figures are of this cycle alone."
         f"{_nox_note(comparison)}"
         f"{_lost_note(comparison)}"
@@ -199,6 +199,13 @@ def _scope_note(comparison: Comparison) -> str:
         for scope, names in cars.items()
     ]
     return f"scope of the bounds: {'; '.join(texts)}\n" if texts else ""
+
+
+def _proof_note(comparison: Comparison) -> str:
+    """What the kinds of proof are that rows name."""
+    named = {row.certificate.proof for row in comparison.rows if row.certificate is not None}
+    words = [f"{proof} = {word}" for proof, word in _PROOFS.items() if proof in named]
+    return f"proof: {'; '.join(words)}.\n" if words else ""
 
 
 def _reference(comparison: Comparison) -> str:
@@ -243,51 +250,3 @@ def _nox_note(comparison: Comparison) -> str:
         return ""
     cars = ", ".join(dict.fromkeys(printable(row.architecture) for row in unknown))
     return f"\nNOx is unknown for {cars}, whose engine has no data on it."
-
-
-def published_table(comparison: Comparison) -> Table | None:
-    """Published figures beside ours; None on other cycles, without the reference or the cases."""
-    statements = published_beside(comparison)
-    if not statements:
-        return None
-    title = "published study (Millo, Rolando, Andreata 2011) beside ours, nothing tuned"
-    table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    for head in ("change", "published", "ours", "what differs"):
-        table.add_column(head, justify="right" if head == "ours" else "left")
-    for statement in statements:
-        table.add_row(*statement)
-    return table
-
-
-def _or_any(limit: float, digits: int) -> str:
-    return f"{limit:.{digits}f}" if isfinite(limit) else "any"
-
-
-def thresholds_line(thresholds: Mapping[str, float]) -> str:
-    """What a rule's calibration took, as the keys of a car's file."""
-    own = ", ".join(f"{key} = {value:.4g}" for key, value in thresholds.items())
-    return f"as keys of [rules] in the car's file: {own}"
-
-
-def calibration_table(plan: Plan) -> Table | None:
-    """The calibration curve of a rule-based strategy; None for the others."""
-    members: list[Mapping[str, Any]] = plan.notes.get("calibration", [])
-    if len(members) < 2:
-        return None
-    title = "calibration: * taken; passed over: the end charge is worth more than 1 % of the cost"
-    table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
-    capped = "nox_cap_kgps" in members[0]
-    heads = ["electric below kW", "below km/h", "above SOC", *(["NOx cap mg/s"] if capped else []),
-             "cost kg", "corrected kg", "NOx g", "end surplus kJ", "passed over", ""]  # fmt: skip
-    for head in heads:
-        table.add_column(head, justify="right")
-    for n, member in enumerate(members):
-        cap = [f"{member['nox_cap_kgps'] * 1e6:.2f}"] if capped else []
-        table.add_row(
-            _or_any(member["threshold_w"] / 1e3, 2), _or_any(member["threshold_mps"] * KMH_PER_MPS, 0),
-            f"{member['threshold_soc']:.2f}", *cap,
-            f"{member['cost_kg']:.5f}", f"{member['corrected_kg']:.5f}",
-            f"{member['nox_kg'] * 1e3:.3f}", f"{member['surplus_j'] / 1e3:+.1f}",
-            "" if member["eligible"] else "yes", "*" if n == plan.notes["chosen"] else "",
-        )  # fmt: skip
-    return table

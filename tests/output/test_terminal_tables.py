@@ -78,6 +78,22 @@ def test_the_mark_of_causal_rows_is_explained_where_a_row_has_it(seen, monkeypat
     assert "†" not in call(monkeypatch, capsys, *words).out
 
 
+def test_published_figures_fit_the_width_too_and_proofs_that_are_shown_are_explained(
+    seen, monkeypatch, capsys
+):
+    words = ("compare", "--architectures", "A,C2", "--strategies", "baseline,conventional")
+    for columns in (80, 100, 140):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        out = call(monkeypatch, capsys, *words).out
+        lines = out.split("\n")
+        assert max(map(len, lines)) <= columns
+        (row,) = (line for line in lines if "C2 conventional, fuel" in line)
+        assert re.search(r"-23 to -24 %   -\d\d\.\d %   \S", row)
+        shown = "proof" in " ".join(table_of(out)[:2])
+        assert shown == ("proof: one multiplier = " in out) == (columns == 140)
+        assert "LP prices" not in out  # no row is proven by them
+
+
 def test_a_failed_row_is_one_word_where_it_is_narrow(seen):
     rows = [line for line in table_of(seen(80)) if line.startswith(" A ")]
     assert len(rows) == 3 and all(line.endswith("failed") for line in rows)

@@ -99,11 +99,15 @@ OVERLAPS = """() => {
 }"""
 
 
-@pytest.mark.parametrize("media", ["screen", "print"])
+@pytest.mark.parametrize("media", ["screen", "narrow", "print"])
 def test_labels_of_the_energy_flow_are_apart_and_crossed_by_no_line(nedc, shown, media):
     page = shown.page
-    page.emulate_media(media=media)
+    page.emulate_media(media="print" if media == "print" else "screen")
     settle(page)
+    if media == "narrow":
+        page.set_viewport_size({"width": 400, "height": 1400})
+        until(page, "document.getElementById('sankey').clientWidth < 400")
+        settle(page)
     # On paper, where the flow is as wide in every row, the last one of each car.
     last = {row.figures.architecture: n for n, row in enumerate(nedc.results.rows)}
     for n in range(0, len(nedc.results.rows), 3) if media == "screen" else last.values():
@@ -112,6 +116,8 @@ def test_labels_of_the_energy_flow_are_apart_and_crossed_by_no_line(nedc, shown,
         page.locator("#row").evaluate(choose, str(n))
         assert page.evaluate(OVERLAPS) == [], n
     page.emulate_media(media="screen")
+    page.set_viewport_size({"width": 1440, "height": 1400})
+    until(page, "document.getElementById('traces')._fullLayout.width > 1200")
     settle(page)
 
 
