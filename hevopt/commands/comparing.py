@@ -219,7 +219,7 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
     left = report.left_out(rows)
     notes = [f"left out for want of width: {', '.join(left)}; --wide shows them."] if left else []
     show_notes("\n".join([*notes, report.comparison_notes(comparison, left), *job.cars.said()]))
-    if job.cold is not None and job.cold.figures:
+    if job.cold is not None:
         from hevopt.output.cold_tables import cold_table
 
         show(cold_table(job.cold))

@@ -13,7 +13,7 @@ def cold_table(cold: ColdStarts) -> Table:
     """A line per row: its warm fuel, with what the cold engine burns more, and how warm it gets."""
     title = (
         f"started cold at {cold.start_c:g} °C: a correction after the solution; strategies and bounds are those of "
-        "the warm car"
+        "the warm car" + ("" if cold.figures else "; no row has an engine that warms up")
     )
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     for head in ("car", "strategy"):

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from hevopt.car.source import SourceLaw
 from hevopt.car.warming import START_C, check_start, warmed
 from hevopt.display.facts import Shown
 from hevopt.problem.problem import Plan, Trajectory
@@ -36,7 +37,7 @@ class ColdFigures(Shown):
 
 
 class ColdStarts:
-    """Takes the figures of every solved row whose engine burns something.
+    """Takes the figures of every solved row whose engine warms up: neither electric cars' nor those of a source.
 
     start_c: coolant's and ambient temperature at the start; figures: car and strategy -> figures
     Raises DataError for a start that the fuel factor does not cover.
@@ -49,7 +50,8 @@ class ColdStarts:
 
     def observe(self, case: Case, row: Row, plan: Plan, trajectory: Trajectory) -> None:
         """Take a solved case."""
-        if trajectory.total_fuel_kg > 0:
+        warms = not isinstance(case.car.engine.law, SourceLaw)
+        if warms and trajectory.total_fuel_kg > 0:
             self.figures[row.architecture, row.strategy] = cold_figures(
                 case, trajectory, self.start_c
             )

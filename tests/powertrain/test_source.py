@@ -14,7 +14,7 @@ FUEL_KGPS = np.array([0.01, 0.036, 0.075, 0.208, 0.437, 0.682]) * 1e-3
 SOURCE = """name = "fuel cell 45 kW"
 power_kw = [0, 2, 5, 15, 30, 45]
 fuel_gps = [0.01, 0.036, 0.075, 0.208, 0.437, 0.682]
-start_fuel_g = 1.0
+start_fuel_g = 0.1
 fuel = { heating_value_mjpkg = 120.0, density_kgpl = 0.0402, co2_kgpkg = 0.0 }
 """
 CONVERTER = 'name = "converter"\nkind = "efficiency"\nefficiency = 0.96\npower_max_w = 5e4\n'

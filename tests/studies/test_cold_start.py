@@ -43,3 +43,10 @@ def test_it_stands_beside_the_rows_and_changes_none(hevopt):
     assert status == 0 and "started cold at 20 °C: a correction after the solution" in out
     status, _, err = hevopt(*words, "--cold-start", "-30")
     assert status == 2 and "allowed: 10 to 95" in err
+
+
+def test_a_car_without_an_engine_that_warms_has_no_row(hevopt):
+    Path("short.csv").write_text("time_s,speed_kmh\n0,0\n5,0\n20,50\n90,50\n110,0\n")
+    words = ("run", "electric_compact", "--strategy", "ecms", "--cycle", "short.csv")
+    status, out, _ = hevopt(*words, "--cold-start", "20")
+    assert status == 0 and "no row has an engine that warms up" in out
