@@ -127,9 +127,12 @@ def is_component(value: Any) -> TypeGuard[str | dict[str, Any]]:
 
 
 def component_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[list[str], str]:
-    """Faults of a component by itself and, without any, in a shipped car; what it is about."""
+    """Faults of a component by itself and, without any, in a shipped car; what it is about.
+
+    No shipped car has a source, of which its own file says everything.
+    """
     faults = table_faults(str(path), contents, MODELS[kind])
-    if not faults:
+    if not faults and kind != "source":
         load_architecture(_TRIED_IN, {kind: str(path.absolute())})
     return faults, str(contents.get("name", ""))
 

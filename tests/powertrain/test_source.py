@@ -5,6 +5,7 @@ import pytest
 from split_cars import short
 
 from hevopt import DataError, build_problem, certify, load_architecture, simulate
+from hevopt.checks.validate import validate
 from hevopt.files.lookup import shipped_folder
 from hevopt.strategies import dp, fitting, thermostat
 
@@ -93,6 +94,15 @@ def test_maps_that_make_no_sense_are_one_message(tmp_path, change, message):
         return
     with pytest.raises(DataError, match=message):
         load_architecture(path)
+
+
+def test_files_of_sources_are_validated_like_others(tmp_path):
+    car = written(tmp_path)
+    good, bad = tmp_path / "components" / "source_cell.toml", tmp_path / "source_bad.toml"
+    bad.write_text(SOURCE.replace("[0, 2, 5,", "[0, 2, -5,"))
+    for path, faults in ((car, 0), (good, 0), (bad, 1)):
+        found = validate(str(path))
+        assert (found.count > 0) == (faults > 0), found.faults
 
 
 def test_a_source_drives_no_shaft(tmp_path):
