@@ -59,8 +59,8 @@ def test_first_gear_at_120_kmh_is_rejected_without_a_warning():
 
 
 @pytest.mark.parametrize("name", ["C1", "D"])
-def test_every_strategy_and_the_certificate_take_a_free_gear(name):
-    problem = build_problem(free(name), load_cycle("nedc"))
+def test_every_strategy_and_the_certificate_take_a_free_gear(name, beginnings):
+    problem = build_problem(free(name), load_cycle(beginnings / "nedc.csv"))
     rollout = simulate(problem, solve(problem).control)
     certificate = certify(problem, rollout)
     for strategy in fitting(load_architecture(name).functions):

@@ -22,7 +22,7 @@ from hevopt import (
     solve,
 )
 from hevopt.studies.fronts import in_units
-from hevopt.studies.pareto import GAP_ENOUGH, Front, HalfPlane, Point, front
+from hevopt.studies.pareto import Front, HalfPlane, Point, front
 
 # Strategies and weights whose plans are held against the outer front.
 DRIVEN = (("conventional", 0), ("nox_cut", 0), ("ecms", 0), ("ecms", 30), ("dp", 7), ("dp", 300))
@@ -102,8 +102,9 @@ def test_no_plan_at_all_lies_beyond_the_outer_front(seed):
 
 def test_no_strategy_crosses_the_outer_front_of_a_car(problem_of):
     problem = problem_of("C2", "nedc")
-    found = front(problem)
-    assert 0 <= found.gap <= GAP_ENOUGH and len(found.points) > 5
+    # Beyond these weights a bound takes the dearest proof.
+    found = front(problem, [0, 2, 4, 8, 16, 32, 64])
+    assert 0 <= found.gap <= 0.02 and len(found.points) > 5
     fuel, nox = ([getattr(p, name) for p in found.points] for name in ("fuel_kg", "nox_kg"))
     assert (np.diff(fuel) > 0).all() and (np.diff(nox) < 0).all()
     slopes = np.diff(fuel) / -np.diff(nox)
@@ -244,7 +245,7 @@ def test_a_users_mistake_is_one_message(monkeypatch, capsys, words, said):
     assert status == 2 and said in err and "Traceback" not in err
 
 
-def test_a_refined_front_begins_at_the_refined_optimum(monkeypatch, capsys):
+def test_a_refined_front_begins_at_the_refined_optimum(quick, monkeypatch, capsys):
     words = ("C2", "--refine", "--json")
     status, out, err = call(monkeypatch, capsys, "pareto", *words, "--weights", "0")
     assert status == 0, err

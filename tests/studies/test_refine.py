@@ -16,12 +16,12 @@ def cost_and_bound(case):
     return trajectory.cost_kg, bound
 
 
-@pytest.mark.parametrize("name", ["C2", "E"])
+@pytest.mark.parametrize("name", ["C2", pytest.param("E", marks=pytest.mark.long)])
 def test_few_levels_refined_come_to_what_many_levels_give(name):
     car, cycle = load_architecture(name), load_cycle("nedc")
     coarse, _ = cost_and_bound(prepare(car, cycle, levels=6))
     refined, bound = cost_and_bound(prepare(car, cycle, REFINED, levels=6))
-    many, _ = cost_and_bound(prepare(car, cycle, levels=161))
+    many, _ = cost_and_bound(prepare(car, cycle, levels=81))
     assert coarse > many * 1.0005
     assert refined == pytest.approx(many, rel=4e-4)
     assert bound <= refined <= 1.0005 * bound
@@ -36,9 +36,9 @@ def test_the_default_levels_need_no_refinement(name):
     assert costs[1] == pytest.approx(costs[0], rel=2e-4)
 
 
-def test_the_certificate_is_of_the_table_with_the_added_levels():
+def test_the_certificate_is_of_the_table_with_the_added_levels(beginnings):
     car = load_architecture("C2")
-    case = prepare(car, load_cycle("hwfet"), REFINED, levels=6)
+    case = prepare(car, load_cycle(beginnings / "hwfet.csv"), REFINED, levels=6)
     assert any(control.level.startswith("refined") for control in case.problem.table.controls)
     for name in fitting(car.functions):
         trajectory = simulate(case.problem, STRATEGIES[name].solve(case.problem).control)
