@@ -68,7 +68,9 @@ def test_a_wrong_change_is_one_message(changes, words):
 
 def test_an_asked_end_charge_is_reached_by_the_optimum_and_judged_for_all():
     low = {"battery.soc.end": 0.5}
-    neutral, plug_in = (compare("nedc", ["C2"], ["conventional", "ecms", "dp"], changes=c).rows for c in ({}, low))
+    neutral, plug_in = (
+        compare("nedc", ["C2"], ["conventional", "ecms", "dp"], changes=c).rows for c in ({}, low)
+    )
     for before, after in zip(neutral, plug_in, strict=True):
         assert after.fuel_l_per_100km < before.fuel_l_per_100km
         assert after.gap_percent >= 0

@@ -90,7 +90,7 @@ def test_a_car_that_cannot_be_solved_as_given_is_named():
 
 def test_where_nothing_is_burnt_there_is_no_change(hevopt):
     Path("drv.csv").write_text("time_s,speed_kmh\n0,0\n3,20\n6,20\n9,0\n")
-    words = ("sensitivity", "C2", "--cycle", "drv.csv", "--soc-start", "0.75", "--soc-end", "0.5")
+    words = "sensitivity C2 --strategies dp --cycle drv.csv --soc-start 0.75 --soc-end 0.5".split()
     status, out, err = hevopt(*words)
     assert status == 0, err
     assert "- / - / -" in out and "burns or emits nothing" in out
@@ -99,13 +99,13 @@ def test_where_nothing_is_burnt_there_is_no_change(hevopt):
 
 
 def test_a_comparison_is_shown_and_written_whatever_a_value_does(hevopt):
-    """1650 kg cannot be driven."""
-    words = "compare --cycle us06 --architectures C2 --strategies dp --mass 1500 --sensitivity"
+    """3740 kg cannot be driven."""
+    words = "compare --architectures A --mass 3400 --sensitivity"
     status, out, err = hevopt(*words.split(), "--report", "page.html", "--save", "saved.gz")
-    assert status == 0 and "C2" in out, err
+    assert status == 0 and "A" in out, err
     mass = next(e for e in load_results(Path("saved.gz")).sensitivity if "mass" in e.parameter)
     assert mass.delta_percent[-1] is None and mass.delta_percent[0] < 0
-    assert "C2, vehicle mass 1650: " in Path("page.html").read_text()
+    assert "A, vehicle mass 3740: " in Path("page.html").read_text()
 
 
 def test_studies_of_a_refined_comparison_are_refined(hevopt, quick):
