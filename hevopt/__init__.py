@@ -51,7 +51,7 @@ _HOME = {
     "DrivenPlan": "hevopt.studies.driven",
     "performance": "hevopt.forward.performance",
     "Performance": "hevopt.forward.performance",
-    "Handling": "hevopt.forward.run",
+    "Handling": "hevopt.car.handling",
     "Asking": "hevopt.forward.asked",
     "coastdown": "hevopt.measured.coastdown.coastdown",
     "HevoptError": "hevopt.errors",

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from hevopt.car.converter import Converter
 from hevopt.car.driveline import Driveline
 from hevopt.car.engine import Engine
+from hevopt.car.handling import Handling
 from hevopt.car.machine import Machine
 from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
@@ -21,6 +22,7 @@ from hevopt.problem.arrays import Array
 from hevopt.problem.battery import Battery
 from hevopt.problem.thresholds import Thresholds
 
+_USUAL = Handling()
 Function = Literal["start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"]
 
 
@@ -48,6 +50,7 @@ class Architecture(Shown):
     weighed: key of engine, machines and battery -> what each weighs and costs
     added_kg: of the vehicle's mass, what sizes have that changes made others
     converter: between battery and bus; None where they are one
+    handling: what shows only where it is driven forward
     """
 
     name: str
@@ -68,6 +71,7 @@ class Architecture(Shown):
     weighed: Mapping[str, Weighed] = field(default_factory=dict)
     added_kg: float = 0.0
     converter: Converter | None = None
+    handling: Handling = _USUAL
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -84,6 +88,12 @@ class Architecture(Shown):
     def terminal_w(self, bus_w: Array) -> Array:
         """Power at the battery's terminals for one at the electric bus, > 0 out of the battery."""
         return bus_w if self.converter is None else self.converter.terminal_w(bus_w)
+
+    @property
+    def shift_gap_s(self) -> float:
+        """The gap of the gearbox's file; none where each half of the gears has a clutch of its own."""
+        several = len(self.driveline.driver_clutches) > 1
+        return 0.0 if self.gearbox is None or several else self.gearbox.shift_gap_s
 
     @property
     def electric(self) -> bool:

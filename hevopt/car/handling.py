@@ -69,6 +69,44 @@ class Shifting(NamedTuple):
     reversal_s: float = 10.0
 
 
+class DriverGains(NamedTuple):
+    """A PID on the speed with feed-forward of acceleration and resistance; gains count per mass of the car.
+
+    F = feed_forward [m_eq a + F_res(v)] of the trace + m (proportional e + derivative de/dt + ∫ integral e dt)
+
+    preview_s: how far ahead it looks; hold_mps: below it a car that shall stand is held
+    governor_s: time constant of an engine that keeps idle speed or is brought to the next gear's
+    start_s: from rest to idle speed by the starter; stop_s: from idle speed to rest
+    charge_per_s: gain by which a plan's stored energy is kept, as power per energy amiss
+    """
+
+    proportional: float = 1.2
+    integral: float = 0.3
+    derivative: float = 0.0
+    feed_forward: float = 1.0
+    preview_s: float = 0.0
+    hold_mps: float = 0.15
+    governor_s: float = 0.15
+    start_s: float = 0.4
+    stop_s: float = 0.3
+    charge_per_s: float = 0.2
+
+
+class Handling(NamedTuple):
+    """Tyres, clutch, gear changes and driver of a car; shifting None: with the gap of its gearbox's file."""
+
+    tyre: Tyre = Tyre()
+    clutch: Clutch = Clutch()
+    shifting: Shifting | None = None
+    driver: DriverGains = DriverGains()
+
+    def check(self) -> None:
+        """DataError for a figure of tyres, clutch or gear changes that is out of range."""
+        for part in (self.tyre, self.clutch, self.shifting):
+            if part is not None:
+                check_ranges(part)
+
+
 _RANGES = {
     "lag_s": (0.0, 1.0),
     "friction": (0.05, 2.0),

@@ -20,6 +20,7 @@ from hevopt.car_files.fields import (
     Soc,
     Table,
 )
+from hevopt.car_files.handling import ClutchFile, DriverFile, ShiftingFile, TyreFile
 from hevopt.files.toml import FileModel
 
 # Points between which efficiency of a converter is looked at.
@@ -120,6 +121,10 @@ class ArchitectureFile(FileModel):
     gear: Literal["cycle", "free"] = "cycle"
     rules: RulesFile | None = None
     converter: ConverterFile | None = None
+    tyre: TyreFile | None = None
+    clutch: ClutchFile | None = None
+    shifting: ShiftingFile | None = None
+    driver: DriverFile | None = None
     coupling: CouplingFile
 
     @model_validator(mode="after")

@@ -1,6 +1,7 @@
 """An architecture from its file and those of its components, with changes of any key made on reading."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -25,6 +26,7 @@ from hevopt.car_files.components import (
 from hevopt.car_files.driveline import CouplingFile
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
+from hevopt.car_files.handling import handling_of
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.parts import driveline_of
 from hevopt.car_files.source import SourceFile, source_of
@@ -94,6 +96,13 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
         weighed=sizes, added_kg=more_kg,
         converter=None if data.converter is None else converter_of(data.converter),
     )  # fmt: skip
+    return _as_driven(car, data)
+
+
+def _as_driven(car: Architecture, data: ArchitectureFile) -> Architecture:
+    """The car with what its file says of tyres, clutch, driver, gear changes, and who chooses the gear."""
+    handling = handling_of(data.tyre, data.clutch, data.shifting, data.driver, car.shift_gap_s)
+    car = replace(car, handling=handling)
     return car.with_free_gear() if data.gear == "free" else car
 
 

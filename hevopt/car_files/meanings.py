@@ -3,6 +3,7 @@
 Model of a file or table -> key -> (unit, meaning). A test keeps it complete.
 """
 
+from hevopt.car_files.handling_meanings import HANDLING_MEANINGS
 from hevopt.car_files.mean_value_meanings import MEAN_VALUE_MEANINGS
 
 _NAME = ("", "name shown in tables and messages")
@@ -26,12 +27,17 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "gear": ("", 'who chooses the engine\'s gear: the cycle (or shift speeds), or "free": the strategy'),
         "rules": ("", "thresholds of the rules; what is left out is calibrated on the cycle"),
         "converter": ("", "DC converter between battery and bus; without it they are one"),
+        "tyre": ("", "driven tyres, where the car is driven forward"),
+        "clutch": ("", "the driver's clutch, where the car is driven forward"),
+        "shifting": ("", "how a gear is changed, where the car is driven forward"),
+        "driver": ("", "who is at the pedals, where the car is driven forward"),
         "coupling": ("", "how engine and machines join the wheels"),
     },
     "ConverterFile": {
         "efficiency": ("-", "share of what it takes in, from either side; one value or a list over power_w"),
         "power_w": ("W", "powers at the bus, of either sign, that efficiencies are given at"),
     },
+    **HANDLING_MEANINGS,
     "RulesFile": {
         "electric_soc": ("-", "state of charge above which the car drives electrically"),
         "electric_power_w": ("W", "up to this power at the wheels; above it the engine is on"),

@@ -1,7 +1,7 @@
 """`hevopt drive` and `hevopt performance`: cars driven forward, along a trace and at full pedal."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -9,6 +9,14 @@ from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOptio
 from hevopt.commands.reporting import check_page, command_line
 from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, InfeasibleError
+
+EngineModelOption = Annotated[
+    Literal["map", "mean_value"],
+    typer.Option(
+        "--engine-model",
+        help="The steady map, or the mean-value engine with its turbocharger's lag.",
+    ),
+]
 
 
 @takes_settings("strategies", "allow_shortfall")
@@ -30,6 +38,7 @@ def drive(
     replay: Annotated[
         bool, typer.Option("--replay", help="Drive the plan even where the strategy can decide.")
     ] = False,
+    engine_model: EngineModelOption = "map",
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit status 3 where the trace is missed.")
     ] = False,
@@ -67,7 +76,7 @@ def drive(
         progress(f"{car.name}: {strategy}", 0, 1)
         driven = driven_by(
             car, job.trace, strategy, settings=settings, step_s=step,
-            asking=Asking(decide_every, dwell), replay=replay,
+            asking=Asking(decide_every, dwell), replay=replay, engine_model=engine_model,
         )  # fmt: skip
     if out is not None:
         write_frame(out, tables.steps_frame(driven.run), job.about)
@@ -101,8 +110,10 @@ def performance(
         float | None, typer.Option("--gap", help="Time without torque in a change of gear, s.")
     ] = None,
     boost_lag: Annotated[
-        float, typer.Option("--boost-lag", help="Time constant by which full load comes, s.")
+        float,
+        typer.Option("--boost-lag", help="Time constant by which full load comes, s; of the map."),
     ] = 0.0,
+    engine_model: EngineModelOption = "map",
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Tractive-force diagram: .png, .svg or .pdf.")
     ] = None,
@@ -112,12 +123,11 @@ def performance(
     json: JsonOption = False,
 ) -> None:
     """How fast cars are: from rest, in gear, top speed and slopes, with and without e-boost."""
-    from hevopt.car.handling import Shifting
     from hevopt.car_files.load import load_architecture
     from hevopt.commands.terminal import listed
     from hevopt.files.writing import check_outs, write_whole
     from hevopt.forward.performance import performance as figures_of
-    from hevopt.forward.run import Handling
+    from hevopt.forward.run import shifting_of
     from hevopt.output import performance_tables as tables
 
     loaded = [load_architecture(name) for name in listed(cars) or []]
@@ -127,16 +137,17 @@ def performance(
         _check_plot(plot)
     check_page(report)
     check_outs({"--plot": plot, "--report": report}, [file for car in loaded for file in car.files])
-    handling = Handling() if gap is None else Handling(shifting=Shifting(gap_s=gap))
     found = []
     with Progress() as progress:
         for n, car in enumerate(loaded):
             progress(car.name, n, len(loaded))
-            for boosts in (False, True) if boost and "e_boost" in car.functions else (False,):
+            shifting = None if gap is None else shifting_of(car)._replace(gap_s=gap)
+            handling = car.handling._replace(shifting=shifting or car.handling.shifting)
+            for how in manners(engine_model, boost and "e_boost" in car.functions):
+                lag = boost_lag if how["engine_model"] == "map" else 0.0
                 found.append(
-                    figures_of(car, boosts=boosts, added_kg=added_mass, boost_lag_s=boost_lag,
-                               handling=handling)
-                )  # fmt: skip
+                    figures_of(car, **how, added_kg=added_mass, boost_lag_s=lag, handling=handling)
+                )
     if plot is not None:
         from hevopt.output.force_diagram import force_diagram
 
@@ -150,13 +161,34 @@ def performance(
 
         write(dumps({"cars": [tables.as_dict(of) for of in found]}, indent=1, allow_nan=False))
         return
-    for table in (tables.speed_table, tables.gear_table, tables.limit_table):
+    for table in (tables.speed_table, tables.gear_table):
         show(table(found))
+    if any(of.boosts for of in found):
+        show(tables.help_table(found))
+    show(tables.limit_table(found))
     write(tables.NOTE)
+    if engine_model == "mean_value":
+        write(tables.MEAN_VALUE_NOTE)
+    for car in loaded:
+        if boost and "e_boost" not in car.functions:
+            write(f"{car.name}: e_boost is none of its functions, so there is no line with it")
     if plot is not None:
         write(f"diagram written to {plot}")
     if report is not None:
         write(f"page written to {report}")
+
+
+def manners(engine_model: str, boost: bool) -> list[dict[str, Any]]:
+    """How a car is driven, line by line: steady map and mean-value engine, alone and with its machine."""
+    found: list[dict[str, Any]] = [{"engine_model": "map"}]
+    if boost:
+        found.append({"engine_model": "map", "boosts": True})
+    if engine_model == "mean_value":
+        found.append({"engine_model": "mean_value"})
+        if boost:
+            found.append({"engine_model": "mean_value", "fills": True})
+            found.append({"engine_model": "mean_value", "boosts": True})
+    return found
 
 
 def _check_plot(plot: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._compile import compiled
-from hevopt.car.handling import Shifting
+from hevopt.car.handling import DriverGains, Shifting
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._contact_kernels import Body
@@ -15,8 +15,8 @@ from hevopt.forward._lever_kernels import (
     keeping_pace_nm,
     moves_machine,
 )
-from hevopt.forward._limits_kernels import Limits, at, share_of_braking
-from hevopt.forward._pedal_kernels import DriverGains, PedalState, wanted_at
+from hevopt.forward._limits_kernels import Gives, Limits, share_of_braking
+from hevopt.forward._pedal_kernels import PedalState, wanted_at
 from hevopt.forward._rows_kernels import Inputs, State, Ways, turning
 from hevopt.forward._share_kernels import (
     AskedStep,
@@ -50,7 +50,7 @@ class LoopCar(NamedTuple):
 class LoopTask(NamedTuple):
     """A trace, and a plan for it of which every step holds from one of its times to the next.
 
-    time_s, speed_mps: (time + 1,); slope_rad: (time,)
+    time_s, speed_mps: (time + 1,); slope_rad: (time,); load_w: (2, time) electric load, engine at rest and not
     from_s, energy_j: (step + 1,); way, engine_on, apart, machine_nm: (step,)
     energy_j: what the plan has stored; apart: the clutch is open while the car is braked, or no gear is in
     """
@@ -58,6 +58,7 @@ class LoopTask(NamedTuple):
     time_s: Array
     speed_mps: Array
     slope_rad: Array
+    load_w: Array
     from_s: Array
     way: NDArray[np.int64]
     engine_on: NDArray[np.bool_]
@@ -81,7 +82,8 @@ def _set_nm(car: LoopCar, task: LoopTask, now: Now, state: State, machine_radps:
     """The machine's set-point: the plan's torque, and what keeps the plan's stored energy."""
     if len(car.limits.load_nm) > 0:
         turns = state.side_radps > 0.3 * car.limits.idle_radps
-        return following_nm(state.side_radps, car.limits) if turns else 0.0
+        load_w = task.load_w[1, now.k]
+        return following_nm(state.side_radps, load_w, car.limits) if turns else 0.0
     d, time = now.step, task.from_s
     share = (now.at_s - time[d]) / (time[d + 1] - time[d])
     planned = task.energy_j[d] + share * (task.energy_j[d + 1] - task.energy_j[d])
@@ -109,6 +111,7 @@ def asked_of(
     pedal: PedalState,
     lever: Lever,
     machine_radps: float,
+    gives: Gives,
 ) -> AskedStep:
     """What the driver and the plan ask of engine and machine."""
     limits, radius = car.limits, car.body.radius_m
@@ -120,12 +123,10 @@ def asked_of(
     set_nm = _set_nm(car, task, now, state, machine_radps)
     if len(limits.load_nm) == 0:
         set_nm = min(max(set_nm, low), high)
-    least = at(limits.least_nm, limits.engine_step, state.side_radps)
-    most = at(limits.full_nm, limits.engine_step, state.side_radps)
     braking = pedal.force_n < 0.0
     accel = 0.0 if pedal.holds else pedal.accel_mps2 / radius
     wheel_nm = 0.0 if pedal.holds else pedal.force_n * radius
-    return AskedStep(wheel_nm, accel, set_nm, low, high, least, most, braking)
+    return AskedStep(wheel_nm, accel, set_nm, low, high, gives.least_nm, gives.most_nm, braking)
 
 
 @compiled(inline="always")
@@ -136,6 +137,7 @@ def inputs_of(
     joint: motor.Joined,
     lever: Lever,
     split: Shared,
+    gives: Gives,
     slope_rad: float,
     machine_nm: Array,
     step_s: float,
@@ -145,8 +147,7 @@ def inputs_of(
     way, output = lever.way, len(car.ways.inertia_kgm2) - 1
     wheel, n = state.speed_mps / car.body.radius_m, state.side_radps
     ratio = turning(car.ways.wheel, way, lever.from_way, lever.blend, output)
-    low = at(limits.least_nm, limits.engine_step, n)
-    high = at(limits.full_nm, limits.engine_step, n)
+    low, high = gives
     rate, capacity, engine = 1.0 - np.exp(-step_s / driver.governor_s), 0.0, split.engine_nm
     if joint.phase == motor.TURNING:
         target = limits.idle_radps
@@ -217,4 +218,5 @@ def split_of(
     if joint.phase != motor.TURNING and car.ways.side[lever.way, 1] != 0.0:
         given = 0.0
     brake = split.brake_nm + friction
-    return Shared(split.engine_nm, given, split.clutch_nm, brake, split.full and not cut)
+    return Shared(split.engine_nm, given, split.clutch_nm, brake, split.full and not cut,
+                  split.wanted_nm)  # fmt: skip

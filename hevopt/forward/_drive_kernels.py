@@ -21,9 +21,9 @@ from hevopt.forward._acting_kernels import (
     is_called,
     split_of,
 )
-from hevopt.forward._contact_kernels import pace_of
+from hevopt.forward._contact_kernels import Pace, pace_of
 from hevopt.forward._lever_kernels import Lever, changed, resting_lever
-from hevopt.forward._limits_kernels import electric_w
+from hevopt.forward._limits_kernels import Gives, by_map, electric_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import State, Ways, row_length, settled_rows, turning
@@ -59,6 +59,14 @@ class Loop(NamedTuple):
     joint: motor.Joined
     energy_j: float
     ahead_mps: float
+
+
+class Place(NamedTuple):
+    """A time, the step of the trace in which it lies, and that of the plan."""
+
+    at_s: float
+    k: int
+    d: int
 
 
 class Look(NamedTuple):
@@ -111,71 +119,79 @@ def step_at(time_s: Array, at_s: float, k: int) -> int:
     return k
 
 
+@compiled(inline="always")
+def after_step(
+    car: LoopCar, task: LoopTask, work: Work, loop: Loop, place: Place, gives: Gives, pace: Pace, row: Array
+) -> tuple[Loop, float]:  # fmt: skip
+    """The loop after one step, and the torque wanted of the engine; gives: what this can give; row: filled."""
+    rows, machine_nm, step_s = work.rows, work.machine_nm, pace.step_s
+    output = len(car.ways.inertia_kgm2) - 1
+    state, pedal, lever, joint, energy, wanted = loop
+    at_s, k, d = place
+    ahead = wanted_at(task.time_s, task.speed_mps, at_s + step_s + car.driver.preview_s, k)
+    wheel, slope = state.speed_mps / car.body.radius_m, task.slope_rad[k]
+    pedal = pressed(pedal, wanted, ahead, state.speed_mps, slope, car.body, car.driver, step_s)
+    machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
+    keeps_nm = pace_nm(machine, car.limits)
+    lever = changed(lever, task.way[d], wheel, car.ways, car.fast_way, car.fast_radps,
+                    car.shifting, step_s, keeps_nm)  # fmt: skip
+    machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
+    machine += car.ways.side[lever.way, 1] * state.side_radps
+    now = Now(d, k, at_s, energy, state.side_radps)
+    wish = asked_of(car, task, now, state, pedal, lever, machine, gives)
+    on = task.engine_on[d] or is_called(task, now, state, car.driver)
+    phase = motor.phase_after(joint.phase, on, state.side_radps, car.limits.idle_radps)
+    ratio = car.ways.wheel[lever.way, output]
+    begins = lever.since_s == 0.0 and lever.blend > 0.0
+    neutral = task.apart[d] == 2 or (task.apart[d] == 1 and wish.braking) or pedal.holds
+    need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9)
+    joint = motor.joined(joint, phase, lever.gap_s > 0.0 or begins, neutral, wish.braking,
+                         ratio * wheel, need, car.limits, car.body.clutch, step_s)  # fmt: skip
+    given = split_of(car, rows, state, wish, joint, lever, machine_nm, step_s)
+    machine_nm[0] = given.machine_nm
+    inputs = inputs_of(car, state, pedal, joint, lever, given, gives, slope, machine_nm, step_s)
+    state, out = step(car.body, car.ways, rows, state, inputs, pace, work.moving)
+    mean = 0.5 * (machine + turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
+                  * state.speed_mps / car.body.radius_m
+                  + car.ways.side[state.way, 1] * state.side_radps)  # fmt: skip
+    power = electric_w(given.machine_nm, mean, car.limits)
+    power += task.load_w[0 if phase == motor.REST else 1, k]
+    if phase == motor.STARTING:
+        mean_n = 0.5 * (now.side_radps + state.side_radps)
+        power += max(out.engine_nm * mean_n, 0.0) / car.limits.spin_efficiency
+    energy -= step_s * chemical_power_at(power, energy, car.battery)
+    stuck = phase == motor.TURNING and joint.closing == 0.0 and not joint.launches
+    stuck = stuck or lever.gap_s > 0.0
+    pedal = remembered(pedal, (stuck and not wish.braking) or (given.full and
+                       pedal.error_mps > 0.0), car.body, car.driver, step_s)  # fmt: skip
+    row[SPEED], row[FORCE], row[SIDE] = state.speed_mps, state.force_n, state.side_radps
+    row[WAY], row[FROM_WAY], row[BLEND] = state.way, state.from_way, state.blend
+    row[ENERGY], row[ENGINE], row[MACHINE] = energy, out.engine_nm, given.machine_nm
+    row[CLUTCH], row[WHEEL], row[BRAKE] = out.clutch_nm, out.wheel_nm, out.brake_nm
+    row[HELD], row[TYRE], row[ROAD] = out.held_nm, out.force_n, out.road_n
+    row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, joint.cause
+    row[FULL], row[VARIANT] = 1.0 if given.full else 0.0, state.variant
+    return Loop(state, pedal, lever, joint, energy, ahead), given.wanted_nm
+
+
+@compiled(inline="always")
+def place_of(task: LoopTask, before: Place, at_s: float) -> Place:
+    """Where a time lies in trace and plan, at an earlier place or behind it."""
+    return Place(at_s, step_at(task.time_s, at_s, before.k), step_at(task.from_s, at_s, before.d))
+
+
 @compiled(nogil=True)
 def advance(
     car: LoopCar, task: LoopTask, work: Work, loop: Loop, first: int, record: Array, step_s: float
 ) -> Loop:  # fmt: skip
-    """The loop after some more steps, `first` of them being the first; record: (step, column), filled."""
-    pace, rows, machine_nm = pace_of(step_s, car.body.tyre.lag_s), work.rows, work.machine_nm
-    output, start = len(car.ways.inertia_kgm2) - 1, task.time_s[0]
-    state, pedal, lever, joint, energy, ahead = loop
-    k, d = (
-        step_at(task.time_s, start + first * step_s, 0),
-        step_at(task.from_s, start + first * step_s, 0),
-    )
+    """The loop after some more steps, `first` of them being the first; record: (step, column), filled.
+
+    The engine is that of the steady map.
+    """
+    pace, start = pace_of(step_s, car.body.tyre.lag_s), task.time_s[0]
+    place = Place(start, 0, 0)
     for i in range(len(record)):
-        at_s = start + (first + i) * step_s
-        k, d = step_at(task.time_s, at_s, k), step_at(task.from_s, at_s, d)
-        wanted, ahead = (
-            ahead,
-            wanted_at(task.time_s, task.speed_mps, at_s + step_s + car.driver.preview_s, k),
-        )
-        wheel, slope = state.speed_mps / car.body.radius_m, task.slope_rad[k]
-        pedal = pressed(pedal, wanted, ahead, state.speed_mps, slope, car.body, car.driver, step_s)
-        machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
-        keeps_nm = pace_nm(machine, car.limits)
-        lever = changed(lever, task.way[d], wheel, car.ways, car.fast_way, car.fast_radps,
-                        car.shifting, step_s, keeps_nm)  # fmt: skip
-        machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
-        machine += car.ways.side[lever.way, 1] * state.side_radps
-        now = Now(d, k, at_s, energy, state.side_radps)
-        wish = asked_of(car, task, now, state, pedal, lever, machine)
-        on = task.engine_on[d] or is_called(task, now, state, car.driver)
-        phase = motor.phase_after(joint.phase, on, state.side_radps, car.limits.idle_radps)
-        ratio = car.ways.wheel[lever.way, output]
-        begins = lever.since_s == 0.0 and lever.blend > 0.0
-        neutral = task.apart[d] == 2 or (task.apart[d] == 1 and wish.braking) or pedal.holds
-        need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9)
-        joint = motor.joined(joint, phase, lever.gap_s > 0.0 or begins, neutral, wish.braking,
-                             ratio * wheel, need, car.limits, car.body.clutch, step_s)  # fmt: skip
-        given = split_of(car, rows, state, wish, joint, lever, machine_nm, step_s)
-        machine_nm[0] = given.machine_nm
-        inputs = inputs_of(car, state, pedal, joint, lever, given, slope, machine_nm, step_s)
-        state, out = step(car.body, car.ways, rows, state, inputs, pace, work.moving)
-        mean = 0.5 * (machine + turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
-                      * state.speed_mps / car.body.radius_m
-                      + car.ways.side[state.way, 1] * state.side_radps)  # fmt: skip
-        power = electric_w(given.machine_nm, mean, car.limits) + car.limits.auxiliary_w
-        if phase == motor.STARTING:
-            mean_n = 0.5 * (now.side_radps + state.side_radps)
-            power += max(out.engine_nm * mean_n, 0.0) / car.limits.spin_efficiency
-        energy -= step_s * chemical_power_at(power, energy, car.battery)
-        stuck = phase == motor.TURNING and joint.closing == 0.0 and not joint.launches
-        stuck = stuck or lever.gap_s > 0.0
-        pedal = remembered(pedal, (stuck and not wish.braking) or (given.full and
-                           pedal.error_mps > 0.0), car.body, car.driver, step_s)  # fmt: skip
-        row = record[i]
-        row[SPEED], row[FORCE], row[SIDE] = state.speed_mps, state.force_n, state.side_radps
-        row[WAY], row[FROM_WAY], row[BLEND] = state.way, state.from_way, state.blend
-        row[ENERGY], row[ENGINE], row[MACHINE] = energy, out.engine_nm, given.machine_nm
-        row[CLUTCH], row[WHEEL], row[BRAKE] = out.clutch_nm, out.wheel_nm, out.brake_nm
-        row[HELD], row[TYRE], row[ROAD] = out.held_nm, out.force_n, out.road_n
-        row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, joint.cause
-        row[FULL], row[VARIANT] = 1.0 if given.full else 0.0, state.variant
-    return Loop(state, pedal, lever, joint, energy, ahead)
-
-
-@compiled(nogil=True)
-def drive(car: LoopCar, task: LoopTask, start_j: float, step_s: float, record: Array) -> None:
-    """Drive a whole trace; record: (step, column), filled."""
-    advance(car, task, work_of(car.ways), begun(car, task, start_j), 0, record, step_s)
+        place = place_of(task, place, start + (first + i) * step_s)
+        gives = by_map(loop.state.side_radps, car.limits)
+        loop, _ = after_step(car, task, work, loop, place, gives, pace, record[i])
+    return loop

@@ -15,7 +15,8 @@ class Limits(NamedTuple):
 
     engine_step, machine_step: rad/s from one value to the next
     full_nm, least_nm: (engine speed,) highest torque, and lowest: drag
-    load_nm: (engine speed,) torque of an alternator that follows the electric load; empty where none does
+    load_nm: (load, engine speed) torque of an alternator that follows the electric load, from load_from_w on in
+    steps of load_step_w; one row where the load is always the same, empty where no alternator follows it
     low_nm, high_nm: (machine speed,) what machine and battery together allow
     loss_w: (machine speed, torque) from -torque_nm to torque_nm
     braking_share: (speed of the car, braking force over weight) share of the braking that may pass the machine's
@@ -27,6 +28,8 @@ class Limits(NamedTuple):
     full_nm: Array
     least_nm: Array
     load_nm: Array
+    load_from_w: float
+    load_step_w: float
     machine_step: float
     low_nm: Array
     high_nm: Array
@@ -41,6 +44,13 @@ class Limits(NamedTuple):
     braking_rate: float
     boosts: bool
     regenerates: bool
+
+
+class Gives(NamedTuple):
+    """Lowest and highest torque of the engine in a step."""
+
+    least_nm: float
+    most_nm: float
 
 
 @compiled()
@@ -64,6 +74,13 @@ def smooth_at(values: Array, step: float, x: float) -> float:
         - (t + 1) * t * (t - 2) / 2 * c
         + (t + 1) * t * (t - 1) / 6 * d
     )
+
+
+@compiled(inline="always")
+def by_map(side_radps: float, limits: Limits) -> Gives:
+    """What the steady map gives at a speed, at once."""
+    step = limits.engine_step
+    return Gives(at(limits.least_nm, step, side_radps), at(limits.full_nm, step, side_radps))
 
 
 @compiled(inline="always")

@@ -3,31 +3,9 @@
 from typing import NamedTuple
 
 from hevopt._compile import compiled
+from hevopt.car.handling import DriverGains
 from hevopt.forward._contact_kernels import Body, resistance
 from hevopt.forward._rows_kernels import Array
-
-
-class DriverGains(NamedTuple):
-    """A PID on the speed with feed-forward of acceleration and resistance; gains count per mass of the car.
-
-    F = feed_forward [m_eq a + F_res(v)] of the trace + m (proportional e + derivative de/dt + ∫ integral e dt)
-
-    preview_s: how far ahead it looks; hold_mps: below it a car that shall stand is held
-    governor_s: time constant of an engine that keeps idle speed or is brought to the next gear's
-    start_s: from rest to idle speed by the starter; stop_s: from idle speed to rest
-    charge_per_s: gain by which a plan's stored energy is kept, as power per energy amiss
-    """
-
-    proportional: float = 1.2
-    integral: float = 0.3
-    derivative: float = 0.0
-    feed_forward: float = 1.0
-    preview_s: float = 0.0
-    hold_mps: float = 0.15
-    governor_s: float = 0.15
-    start_s: float = 0.4
-    stop_s: float = 0.3
-    charge_per_s: float = 0.2
 
 
 class PedalState(NamedTuple):

@@ -6,18 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._compile import compiled
+from hevopt.forward import _rows_kernels as col
 from hevopt.forward._acting_kernels import LoopCar
-from hevopt.forward._contact_kernels import clutch_capacity_nm, pace_of, resistance
-from hevopt.forward._lever_kernels import changed, keeping_pace_nm, moves_machine, resting_lever
-from hevopt.forward._limits_kernels import at, electric_w
+from hevopt.forward._contact_kernels import Pace, clutch_capacity_nm, pace_of, resistance
+from hevopt.forward._lever_kernels import (
+    Lever,
+    changed,
+    keeping_pace_nm,
+    moves_machine,
+    resting_lever,
+)
+from hevopt.forward._limits_kernels import Gives, at, by_map, electric_w
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Array, Inputs, State, row_length, settled_rows, turning
 from hevopt.forward._share_kernels import following_nm, machine_range, pace_nm
 from hevopt.problem._battery_kernels import chemical_power_at
 
 # Columns of what is recorded after every step.
-SPEED, DISTANCE, GEAR, ENERGY, SIDE, FORCE = range(6)
-COLUMNS = 6
+SPEED, DISTANCE, GEAR, ENERGY, SIDE, FORCE, MACHINE = range(7)
+COLUMNS = 7
 # How much of the last step's gain in speed an engine is brought ahead of the gears.
 _AHEAD = 1.1
 
@@ -26,26 +33,139 @@ class Foot(NamedTuple):
     """How the pedal is floored.
 
     launch_radps, up_radps: engine speed held in the launch, and of a change up; boosts: whether the machine helps
+    fills: whether it adds no more than what the engine lacks of its steady full load
     lag_s, natural_share: full load comes as  s0 + (1 - s0)(1 - exp(-t / lag))  with the pedal; 0 for at once
     """
 
     launch_radps: float
     up_radps: float
     boosts: bool
+    fills: bool
     lag_s: float
     natural_share: float
 
 
+class Pull(NamedTuple):
+    """The car at full pedal between two steps.
+
+    gear: place in the gears; closing: of the clutch, from 0 to 1; gained_radps: by the wheels in the last step
+    """
+
+    state: State
+    lever: Lever
+    gear: int
+    launches: bool
+    closing: float
+    gained_radps: float
+    distance_m: float
+    energy_j: float
+
+
+class PullWork(NamedTuple):
+    """What the loop works with: settled_rows of the ways, space for a row of a moving one, and for a torque."""
+
+    rows: Array
+    moving: Array
+    machine_nm: Array
+
+
+@compiled()
+def pull_work(car: LoopCar) -> PullWork:
+    """Room for the loop's work."""
+    return PullWork(settled_rows(car.ways), np.empty(row_length(car.ways)), np.zeros(1))
+
+
+@compiled()
+def pull_begun(
+    car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, start: tuple[float, int, float]
+) -> Pull:  # fmt: skip
+    """The car before its first step; start: speed, place of the gear, stored energy."""
+    speed, gear, energy = start
+    way, launches = by_gear[gear], speed == 0.0
+    ratio = car.ways.wheel[way, len(car.ways.inertia_kgm2) - 1]
+    turns = max(ratio * speed / car.body.radius_m, car.limits.idle_radps)
+    passive, _, along = resistance(speed, 0.0, car.body)
+    state = State(speed, 0.0 if launches else passive + along, foot.launch_radps if launches else turns,
+                  way, way, 0.0, 0)  # fmt: skip
+    return Pull(
+        state, resting_lever(way), gear, launches, 0.0 if launches else 1.0, 0.0, 0.0, energy
+    )
+
+
+@compiled()
+def _lacking_nm(row: Array, missing_nm: float) -> float:
+    """The machine's torque that does at the wheels what one of the engine would."""
+    clutch = row[col.CLUTCH]
+    engine = row[col.ENGINE] + clutch * row[col.SIDE_ENGINE]
+    machine = row[col.MACHINES] + clutch * row[col.MACHINES + 1]
+    return float(engine * missing_nm / machine) if machine > 0.0 else 0.0
+
+
 @compiled()
 def _machine_nm(
-    car: LoopCar, foot: Foot, side_radps: float, speed: float, energy_j: float
+    car: LoopCar, foot: Foot, pull: Pull, way_row: Array, speed: float, most_nm: float
 ) -> float:
-    """The machine's torque: what the load needs of an alternator, all it has where it helps."""
+    """The machine's torque: what the load needs of an alternator, all it has or what is lacking where it helps."""
+    side = pull.state.side_radps
     if len(car.limits.load_nm) > 0:
-        return following_nm(side_radps, car.limits)
-    if not foot.boosts or energy_j <= car.window_j[0]:
+        return following_nm(side, car.limits.auxiliary_w, car.limits)
+    if not foot.boosts or pull.energy_j <= car.window_j[0]:
         return 0.0
-    return machine_range(speed, car.limits)[1]
+    high = machine_range(speed, car.limits)[1]
+    if not foot.fills:
+        return high
+    full = at(car.limits.full_nm, car.limits.engine_step, side)
+    return min(max(_lacking_nm(way_row, full - most_nm), 0.0), high)
+
+
+@compiled(inline="always")
+def after_pull(
+    car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, work: PullWork, pull: Pull, gives: Gives,
+    launch_nm: float, pace: Pace, row: Array,
+) -> tuple[Pull, float]:  # fmt: skip
+    """The car after a step, and the engine's torque in it; launch_nm: what it can give at launch speed."""
+    step_s, machine_nm, limits, radius = pace.step_s, work.machine_nm, car.limits, car.body.radius_m
+    state, lever, gear, launches, closing, gained, distance, energy = pull
+    output, way = len(car.ways.inertia_kgm2) - 1, by_gear[0]
+    wheel, n = state.speed_mps / radius, state.side_radps
+    if n >= foot.up_radps and gear + 1 < len(by_gear) and not launches and closing == 1.0:
+        gear, closing = gear + 1, 0.0
+    machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
+    machine += car.ways.side[lever.way, 1] * n
+    lever = changed(lever, by_gear[gear], wheel, car.ways, car.fast_way, car.fast_radps, car.shifting,
+                    step_s, pace_nm(machine, limits))  # fmt: skip
+    ratio = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, output)
+    machine_nm[0] = _machine_nm(car, foot, pull, work.rows[lever.way, 0], machine, gives.most_nm)
+    if foot.fills and lever.gap_s > 0.0:
+        machine_nm[0] = 0.0
+    if moves_machine(car.ways, lever) and lever.gap_s > 0.0:
+        machine_nm[0] = keeping_pace_nm(car.ways, state, lever, wheel, step_s)
+    if launches and car.ways.wheel[by_gear[0], output] * wheel >= foot.launch_radps:
+        launches, closing = False, 1.0
+    # As fast as the gears will be, and no slower: a clutch that is overtaken within a step passes nothing.
+    target, capacity = max(ratio * (wheel + gained), limits.idle_radps), 0.0
+    rate = 1.0 - np.exp(-step_s / car.driver.governor_s)
+    if launches:
+        target, rate = foot.launch_radps, 1.0
+        capacity = launch_nm + car.ways.side[way, 1] * machine_nm[0]
+    elif lever.gap_s == 0.0:
+        closing = min(closing + step_s / max(car.body.clutch.closing_s, step_s), 1.0)
+        rate = 1.0
+        capacity = closing * clutch_capacity_nm(n - ratio * wheel, car.body.clutch)
+    inputs = Inputs(machine_nm, gives.most_nm, n + rate * (target - n), gives.least_nm,
+                    max(gives.most_nm, gives.least_nm), capacity, 0.0, 0.0, lever.way, lever.from_way,
+                    lever.blend)  # fmt: skip
+    before = state.speed_mps
+    state, out = step(car.body, car.ways, work.rows, state, inputs, pace, work.moving)
+    distance += 0.5 * step_s * (before + state.speed_mps)
+    gained = max(_AHEAD * (state.speed_mps - before) / radius, 0.0)
+    after = turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
+    after = after * state.speed_mps / radius + car.ways.side[state.way, 1] * state.side_radps
+    power = electric_w(machine_nm[0], 0.5 * (machine + after), limits) + limits.auxiliary_w
+    energy -= step_s * chemical_power_at(power, energy, car.battery)
+    row[SPEED], row[DISTANCE], row[GEAR], row[ENERGY] = state.speed_mps, distance, gear, energy
+    row[SIDE], row[FORCE], row[MACHINE] = state.side_radps, out.force_n, machine_nm[0]
+    return Pull(state, lever, gear, launches, closing, gained, distance, energy), out.engine_nm
 
 
 @compiled(nogil=True)
@@ -53,57 +173,14 @@ def pull(
     car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, start: tuple[float, int, float],
     step_s: float, record: Array,
 ) -> None:  # fmt: skip
-    """Fill the record, (step, column); by_gear: way of every gear; start: speed, place in it, stored energy."""
-    pace, rows = pace_of(step_s, car.body.tyre.lag_s), settled_rows(car.ways)
-    scratch, machine_nm = np.empty(row_length(car.ways)), np.zeros(1)
-    output, radius, limits = len(car.ways.inertia_kgm2) - 1, car.body.radius_m, car.limits
-    speed, gear, energy = start
-    way, launches, distance = by_gear[gear], speed == 0.0, 0.0
-    ratio = car.ways.wheel[way, output]
-    side = foot.launch_radps if launches else max(ratio * speed / radius, limits.idle_radps)
-    passive, _, along = resistance(speed, 0.0, car.body)
-    state = State(speed, 0.0 if launches else passive + along, side, way, way, 0.0, 0)
-    lever, closing, gained = resting_lever(way), 0.0 if launches else 1.0, 0.0
+    """Fill the record, (step, column); by_gear: way of every gear; start: as of pull_begun."""
+    pace, work, limits = pace_of(step_s, car.body.tyre.lag_s), pull_work(car), car.limits
+    moved = pull_begun(car, by_gear, foot, start)
     for i in range(len(record)):
-        wheel, n = state.speed_mps / radius, state.side_radps
-        if n >= foot.up_radps and gear + 1 < len(by_gear) and not launches and closing == 1.0:
-            gear, closing = gear + 1, 0.0
-        machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
-        machine += car.ways.side[lever.way, 1] * n
-        lever = changed(lever, by_gear[gear], wheel, car.ways, car.fast_way, car.fast_radps, car.shifting,
-                        step_s, pace_nm(machine, limits))  # fmt: skip
-        ratio = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, output)
         share = 1.0
         if foot.lag_s > 0.0:
             share -= (1.0 - foot.natural_share) * np.exp(-i * step_s / foot.lag_s)
-        most = share * at(limits.full_nm, limits.engine_step, n)
-        least = at(limits.least_nm, limits.engine_step, n)
-        machine_nm[0] = _machine_nm(car, foot, n, machine, energy)
-        if moves_machine(car.ways, lever) and lever.gap_s > 0.0:
-            machine_nm[0] = keeping_pace_nm(car.ways, state, lever, wheel, step_s)
-        if launches and car.ways.wheel[by_gear[0], output] * wheel >= foot.launch_radps:
-            launches, closing = False, 1.0
-        # As fast as the gears will be, and no slower: a clutch that is overtaken within a step passes nothing.
-        target, capacity = max(ratio * (wheel + gained), limits.idle_radps), 0.0
-        rate = 1.0 - np.exp(-step_s / car.driver.governor_s)
-        if launches:
-            target, rate = foot.launch_radps, 1.0
-            capacity = share * at(limits.full_nm, limits.engine_step, foot.launch_radps)
-            capacity += car.ways.side[way, 1] * machine_nm[0]
-        elif lever.gap_s == 0.0:
-            closing = min(closing + step_s / max(car.body.clutch.closing_s, step_s), 1.0)
-            rate = 1.0
-            capacity = closing * clutch_capacity_nm(n - ratio * wheel, car.body.clutch)
-        inputs = Inputs(machine_nm, most, n + rate * (target - n), least, max(most, least), capacity, 0.0,
-                        0.0, lever.way, lever.from_way, lever.blend)  # fmt: skip
-        before = state.speed_mps
-        state, out = step(car.body, car.ways, rows, state, inputs, pace, scratch)
-        distance += 0.5 * step_s * (before + state.speed_mps)
-        gained = max(_AHEAD * (state.speed_mps - before) / radius, 0.0)
-        after = turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
-        after = after * state.speed_mps / radius + car.ways.side[state.way, 1] * state.side_radps
-        power = electric_w(machine_nm[0], 0.5 * (machine + after), limits) + limits.auxiliary_w
-        energy -= step_s * chemical_power_at(power, energy, car.battery)
-        row = record[i]
-        row[SPEED], row[DISTANCE], row[GEAR], row[ENERGY] = state.speed_mps, distance, gear, energy
-        row[SIDE], row[FORCE] = state.side_radps, out.force_n
+        least, full = by_map(moved.state.side_radps, limits)
+        launch_nm = share * at(limits.full_nm, limits.engine_step, foot.launch_radps)
+        gives = Gives(least, share * full)
+        moved, _ = after_pull(car, by_gear, foot, work, moved, gives, launch_nm, pace, record[i])

@@ -20,13 +20,17 @@ _ROTOR_SHARE = 0.02
 
 
 class Shared(NamedTuple):
-    """Torques for a step; clutch_nm: what the clutch has to pass; full: whether all is given and is too little."""
+    """Torques for a step; clutch_nm: what the clutch has to pass; full: whether all is given and is too little.
+
+    wanted_nm: of the engine, more than it can give included; 0 with the clutch open
+    """
 
     engine_nm: float
     machine_nm: float
     clutch_nm: float
     brake_nm: float
     full: bool
+    wanted_nm: float
 
 
 class AskedStep(NamedTuple):
@@ -73,13 +77,14 @@ def _clip(value: float, low: float, high: float) -> float:
 
 
 @compiled()
-def _closed(asked: AskedStep, meets: Meets, limits: Limits) -> tuple[float, float]:
-    """Torques of engine and machine with the clutch closed."""
+def _closed(asked: AskedStep, meets: Meets, limits: Limits) -> tuple[float, float, float]:
+    """Torques of engine and machine with the clutch closed, and the one wanted of the engine."""
     machine, need = asked.set_nm, asked.wheel_nm - meets.c0
     if asked.braking and limits.regenerates and meets.cm > 0.0:
         swing = (need - meets.ce * asked.least_nm) / meets.cm
         machine = _clip(swing, asked.low_nm, max(min(machine, 0.0), asked.low_nm))
     engine = (need - meets.cm * machine) / meets.ce
+    wanted = engine
     if engine < asked.least_nm:
         engine = asked.least_nm
         if meets.cm > 0.0 and len(limits.load_nm) == 0:
@@ -90,7 +95,7 @@ def _closed(asked: AskedStep, meets: Meets, limits: Limits) -> tuple[float, floa
         if meets.cm > 0.0 and limits.boosts:
             swing = (need - meets.ce * engine) / meets.cm
             machine = _clip(swing, machine, max(asked.high_nm, machine))
-    return engine, machine
+    return engine, machine, wanted
 
 
 @compiled()
@@ -111,8 +116,9 @@ def shared(
     for _ in range(_TRIES):
         row = rows[way, variant]
         meets, clutch, engine = _meets(row, asked.accel, closed), 0.0, 0.0
+        wanted = 0.0
         if closed:
-            engine, machine = _closed(asked, meets, limits)
+            engine, machine, wanted = _closed(asked, meets, limits)
             side_accel = row[col.RATIO] * asked.accel
             clutch = row[col.SIDE_ENGINE] * engine + row[col.MACHINES + 1] * machine
             clutch -= row[col.SIDE_PER_W] * asked.accel + row[col.SIDE_PER_N] * side_accel
@@ -121,6 +127,7 @@ def shared(
             most = row[col.SIDE_ENGINE] * asked.most_nm + row[col.MACHINES + 1] * machine
             side_accel = 0.0
             clutch = (asked.wheel_nm - meets.c0 - meets.cm * machine) / row[col.CLUTCH]
+            wanted = (clutch - row[col.MACHINES + 1] * machine) / row[col.SIDE_ENGINE]
             if clutch > most and limits.boosts and meets.cm > 0.0:
                 machine = _clip(
                     (asked.wheel_nm - meets.c0 - row[col.CLUTCH] * most) / meets.cm,
@@ -146,7 +153,7 @@ def shared(
     short = given < asked.wheel_nm - 1e-6 * abs(asked.wheel_nm) - 1e-9
     brake = max(given - asked.wheel_nm, 0.0) if asked.braking else 0.0
     full = short and not asked.braking and (closed or launching or meets.cm > 0.0)
-    return Shared(engine, machine, clutch, brake, full)
+    return Shared(engine, machine, clutch, brake, full, wanted)
 
 
 @compiled(inline="always")
@@ -156,10 +163,17 @@ def machine_range(speed: float, limits: Limits) -> tuple[float, float]:
     return low, at(limits.high_nm, limits.machine_step, abs(speed))
 
 
-@compiled(inline="always")
-def following_nm(side_radps: float, limits: Limits) -> float:
+@compiled()
+def following_nm(side_radps: float, load_w: float, limits: Limits) -> float:
     """Torque of an alternator that follows the electric load."""
-    return smooth_at(limits.load_nm, limits.engine_step, side_radps)
+    rows = len(limits.load_nm)
+    if rows == 1:
+        return smooth_at(limits.load_nm[0], limits.engine_step, side_radps)
+    place = min(max((load_w - limits.load_from_w) / limits.load_step_w, 0.0), rows - 1.000001)
+    i = int(place)
+    low = smooth_at(limits.load_nm[i], limits.engine_step, side_radps)
+    high = smooth_at(limits.load_nm[i + 1], limits.engine_step, side_radps)
+    return low + (place - i) * (high - low)
 
 
 @compiled(inline="always")

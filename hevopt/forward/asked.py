@@ -12,18 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.handling import Handling
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward._acting_kernels import LoopTask
+from hevopt.forward.breathing import EngineModel, breathing_of
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.plans import ForwardPlan, driver_gears, flows_of, signals_of
 from hevopt.forward.run import (
     STEP_S,
     ForwardRun,
-    Handling,
     loop_car,
     run_of,
+    start_radps,
     steps_of,
     task_of,
     whole_handling,
@@ -124,6 +126,7 @@ def follow_asked(
     step_s: float = STEP_S,
     handling: Handling | None = None,
     line: Line | None = None,
+    engine_model: EngineModel = "map",
 ) -> ForwardRun:
     """The car driven along the cycle, a strategy deciding on the way.
 
@@ -138,9 +141,11 @@ def follow_asked(
     from_s = cycle.time_s[0] + exact_s * begins
     # Nothing is planned, so that there is no charge to be kept.
     driver = handling.driver._replace(charge_per_s=0.0)
-    driven = loop_car(car, line, handling._replace(driver=driver))
-    gears, step, task = _undecided(cycle, from_s, planned)
+    gears, step, task = _undecided(car, cycle, from_s, planned)
+    driven = loop_car(car, line, handling._replace(driver=driver), task.load_w)
     work, loop = col.work_of(driven.ways), col.begun(driven, task, float(planned.energy_j[0]))
+    breathing = breathing_of(car, engine_model, start_radps(car, line, cycle, task))
+    advance = col.advance if breathing is None else breathing.advance
     for d, at_s in enumerate(from_s[:-1].tolist()):
         # A step of the driven car may begin a little before the cycle's.
         k = int(step[d]) if decider.points is not None else min(d, len(gears) - 1)
@@ -151,13 +156,13 @@ def follow_asked(
         if d == 0:
             loop = col.begun(driven, task, loop.energy_j)
         part = record[begins[d] : begins[d + 1]]
-        loop = col.advance(driven, task, work, loop, int(begins[d]), part, exact_s)
+        loop = advance(driven, task, work, loop, int(begins[d]), part, exact_s)
     planned_j = np.asarray(planned.energy_j, dtype=np.float64)
-    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s)
+    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s, breathing)
 
 
 def _undecided(
-    cycle: Cycle, from_s: Array, planned: Trajectory
+    car: Architecture, cycle: Cycle, from_s: Array, planned: Trajectory
 ) -> tuple[Indices, Indices, LoopTask]:
     """The driver's gear at each step of the cycle, the step of each decision, and the task before any of them."""
     table, count = planned.problem.table, len(from_s) - 1
@@ -167,4 +172,4 @@ def _undecided(
         np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool), open_while[step], np.zeros(count),
         np.full(count + 1, float(planned.energy_j[0])),
     )  # fmt: skip
-    return gears, step, task_of(cycle, plan, from_s)
+    return gears, step, task_of(car, cycle, plan, from_s)

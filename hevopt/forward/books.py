@@ -11,6 +11,7 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown
+from hevopt.forward import _breathing_kernels as gas
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.lines import Line
@@ -68,16 +69,24 @@ def turning_of(line: Line, record: Array, start: tuple[float, float], radius_m: 
 
 
 def books_of(
-    car: Architecture, line: Line, record: Array, start: tuple[float, float, float], step_s: float
-) -> Books:
-    """The books of a run; start: the car's speed, the engine side's and stored energy before the first step."""
+    car: Architecture, line: Line, record: Array, start: tuple[float, float, float], step_s: float,
+    load_w: Array, breath: Array | None = None,
+) -> Books:  # fmt: skip
+    """The books of a run; start: the car's speed, the engine side's and stored energy before the first step.
+
+    load_w: (step,) electric load
+    breath: (step, column) of a mean-value engine, see _breathing_kernels, whose fuel counts
+    """
     turning = turning_of(line, record, start[:2], car.vehicle.tyre_radius_m)
     mean = turning.mean
     w, n, units = mean(turning.wheel), mean(turning.side), mean(turning.units)
     inertia = line.ways.inertia_kgm2[:, None] * np.diff(turning.units**2, axis=1) / (2 * step_s)
     flows = _driven(car, record, w, n, units, inertia, step_s)
+    flows["auxiliary_power_w"] = load_w
     flows |= _joints(line, record, turning, step_s)
-    flows |= _burnt(car, flows)
+    flows |= _burnt(car, flows, None if breath is None else breath[:, gas.FUEL] / step_s)
+    if breath is not None:
+        flows |= _breath(flows, breath)
     starter = np.maximum(flows["start_w"], 0.0) / car.machines[0].spin_efficiency
     flows["starter_electric_w"] = starter
     electric = flows["machine_electric_w"] + flows["auxiliary_power_w"] + starter
@@ -129,7 +138,6 @@ def _driven(
         "kinetic_w": car.vehicle.equivalent_mass_kg
         * (record[:, col.SPEED] ** 2 - before**2)
         / (2 * step_s),
-        "auxiliary_power_w": np.full(len(record), car.vehicle.auxiliary_power_w),
     }
     for number, name in CAUSES.items():
         flows[f"clutch_{name}_w"] = np.where(cause == number, clutch, 0.0)
@@ -157,16 +165,32 @@ def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[
     return result
 
 
-def _burnt(car: Architecture, flows: Mapping[str, Array]) -> dict[str, Array]:
-    """Fuel, NOx and the machine's electric power, by the car's own components."""
+def _breath(flows: Mapping[str, Array], breath: Array) -> dict[str, Array]:
+    """What the mean-value engine did beside burning. gas_lacking_nm: torque that it was to give and could not."""
+    lacking = flows["engine_torque_nm"] - breath[:, gas.GIVEN]
+    return {
+        "turbo_speed_radps": breath[:, gas.TURBO],
+        "boost_pa": breath[:, gas.BOOST],
+        "excess_air": breath[:, gas.EXCESS],
+        "engine_available_nm": breath[:, gas.AVAILABLE],
+        "gas_lacking_nm": np.where(flows["fuel_kgps"] > 0, lacking, 0.0),
+    }
+
+
+def _burnt(
+    car: Architecture, flows: Mapping[str, Array], own_kgps: Array | None
+) -> dict[str, Array]:
+    """Fuel, NOx and the machine's electric power, by the car's own components; own_kgps: fuel not by the map."""
     torque, speed = flows["engine_torque_nm"], flows["engine_speed_radps"]
     turns = (speed > 0) & (flows["start_w"] == 0) & (flows["stop_w"] == 0)
     fuel = np.where(turns, car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)), 0.0)
+    by_map = {} if own_kgps is None else {"map_fuel_kgps": fuel}
+    fuel = fuel if own_kgps is None else own_kgps
     nox = np.where(fuel == 0, 0.0, car.engine.nox_kgps(torque, np.where(turns, speed, 1.0)))
     power = fuel * car.engine.heating_value_jpkg
     machine = np.abs(flows["machine_speed_radps"])
     loss = car.machines[0].loss_w(flows["machine_torque_nm"], machine)
-    return {
+    return by_map | {
         "fuel_kgps": fuel,
         "nox_kgps": nox,
         "fuel_power_w": power,

@@ -11,6 +11,8 @@ from hevopt.problem.battery import power_limits_w
 _ENGINE_STEP_RADPS = 0.25
 _MACHINE_POINTS = 1201
 _TORQUES = 201
+# Loads at which the torque of an alternator is tabulated where the cycle lists the load.
+_LOADS = 33
 # Beyond its highest speed by this share an engine is not tabulated, and neither is a machine.
 _BEYOND = 1.2
 # Steps of a table of the braking that a machine may take: speed, and braking force over weight.
@@ -19,26 +21,31 @@ _BRAKING_MPS, _BRAKING_RATE = 0.25, 0.01
 _FASTEST_RADPS, _STRONGEST_NM = 2e4, 1e4
 
 
-def limits_of(car: Architecture) -> Limits:
-    """The limits of a car with one machine."""
+def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> Limits:
+    """The limits of a car with one machine; loads_w: least and greatest electric load, None for the car's own."""
+    own_w = car.vehicle.auxiliary_power_w
+    least_w, most_w = loads_w or (own_w, own_w)
     engine, machine = car.engine, car.machines[0]
     speed = np.arange(0.0, _BEYOND * engine.speed_max_radps, _ENGINE_STEP_RADPS)
     least = np.nan_to_num(engine.drag_nm(speed))
     full = engine.covered_nm(speed)
     full = np.where(np.isnan(full) | (speed > engine.speed_max_radps), np.maximum(least, 0.0), full)
-    load = np.zeros(0)
+    load, rows = np.zeros((0, len(speed))), _LOADS if most_w > least_w else 1
     if car.driveline.follows_load:
         turning = np.maximum(speed, 0.3 * engine.idle_radps)
-        load = np.nan_to_num(machine.generating_nm(car.vehicle.auxiliary_power_w, turning))
+        given = (
+            machine.generating_nm(w, turning) for w in np.linspace(least_w, most_w, rows).tolist()
+        )
+        load = np.nan_to_num(np.array(list(given)))
     top = min(machine.speed_max_radps, _FASTEST_RADPS)
     machine_speed = np.linspace(0.0, _BEYOND * top, _MACHINE_POINTS)
     most = float(min(machine.torque_max_nm, _STRONGEST_NM))
     torque = np.linspace(-most, most, _TORQUES)
     loss = np.nan_to_num(machine.loss_w(torque[None, :], machine_speed[:, None]))
-    low, high = _allowed(car, machine, machine_speed)
+    low, high = _allowed(car, machine, machine_speed, (least_w, most_w))
     return Limits(
-        _ENGINE_STEP_RADPS, full, least, load, float(machine_speed[1]), low, high, loss, most,
-        engine.idle_radps, engine.speed_max_radps, car.vehicle.auxiliary_power_w,
+        _ENGINE_STEP_RADPS, full, least, load, float(least_w), float(most_w - least_w) / max(rows - 1, 1),
+        float(machine_speed[1]), low, high, loss, most, engine.idle_radps, engine.speed_max_radps, own_w,
         machine.spin_efficiency, _braking_share(car), _BRAKING_MPS, _BRAKING_RATE,
         bool(car.functions & {"e_boost", "nox_cut", "power_management"}),
         "regenerative_braking" in car.functions,
@@ -55,16 +62,19 @@ def _braking_share(car: Architecture) -> Array:
     return np.ascontiguousarray(braking.share(speed[:, None], rate[None, :]), dtype=np.float64)
 
 
-def _allowed(car: Architecture, machine: Machine, speed: Array) -> tuple[Array, Array]:
-    """(speed,) lowest and highest torque that machine and battery allow."""
+def _allowed(
+    car: Architecture, machine: Machine, speed: Array, loads_w: tuple[float, float]
+) -> tuple[Array, Array]:
+    """(speed,) lowest and highest torque that machine and battery allow at any of the loads."""
     limit = np.minimum(machine.limit_nm(speed), _STRONGEST_NM)
     limit = np.where(speed <= machine.speed_max_radps, limit, 0.0)
     share = np.linspace(-1.0, 1.0, 2 * _TORQUES + 1)
     torque = limit[:, None] * share
     loss = np.nan_to_num(machine.loss_w(torque, speed[:, None]), nan=np.inf)
-    power = torque * speed[:, None] + loss + car.vehicle.auxiliary_power_w
+    drawn = torque * speed[:, None] + loss
+    power = drawn + loads_w[1]
     least, greatest = power_limits_w(car.battery)
-    inside = (power >= least) & (power <= greatest) | (share == 0)
+    inside = (drawn + loads_w[0] >= least) & (power <= greatest) | (share == 0)
     high = np.max(np.where(inside, torque, 0.0), axis=1)
     # Beyond the torque of least electric power more braking charges less.
     best = np.argmin(np.where(inside, power, np.inf), axis=1)

@@ -99,8 +99,6 @@ def _check(car: Architecture) -> None:
         lacking = "more than one part follows a choice of its own"
     elif car.converter is not None:
         lacking = "a converter stands between its battery and the bus"
-    elif car.vehicle.auxiliary_off_power_w is not None:
-        lacking = "its electric load depends on the engine (auxiliary_off_power_w)"
     if lacking:
         raise DataError(
             f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "

@@ -2,30 +2,45 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.handling import Handling
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.forward import _pull_kernels as col
 from hevopt.forward._acting_kernels import LoopCar
+from hevopt.forward._contact_kernels import resistance
 from hevopt.forward._pull_kernels import Foot
-from hevopt.forward.lines import Line, line_of
-from hevopt.forward.run import Handling, loop_car, shifting_of
+from hevopt.forward.breathing import Breathing, EngineModel, check_engine_model
+from hevopt.forward.forces import (
+    LAUNCH_RPM,
+    Curves,
+    by_gear,
+    forces_of,
+    slope_at,
+    start_slope,
+    tabulated,
+    top_mps,
+)
+from hevopt.forward.lines import line_of
+from hevopt.forward.run import loop_car, shifting_of
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import energy_j
-from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS, STANDARD_GRAVITY_MPS2
+from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
 STEP_S = 0.01
-LAUNCH_RPM, UP_RPM = 1800.0, 4200.0
+UP_RPM = 4200.0
 SPEEDS_KMH = tuple(range(20, 161, 20))
 DISTANCES_M = (400.0, 1000.0)
 IN_GEAR_KMH = ((60, 100), (80, 120))
 FOURTH_KMH = (40, 80)
 SUSTAINED_KMH = (50, 90, 130)
 _LONGEST_S = 120.0
+# A mean-value engine is driven so far at a time, until all is reached.
+_PIECE_S = 1.0
 _NATURAL_SHARE = 0.45
 
 
@@ -34,10 +49,13 @@ class Performance(Shown):
     """Figures of a car at full pedal, on a level road; None where it does not get there.
 
     to_speed_s: km/h -> time from rest; to_distance: m -> time from rest, and speed there in m/s
-    in_gear_s: (gear, from km/h, to km/h) -> time; top_mps: gear -> highest speed of the engine alone
+    in_gear_s, in_gear_j: (gear, from km/h, to km/h) -> time, and energy from the battery until then
+    top_mps: gear -> highest speed of the engine alone
     start_slope: highest slope, rise over run, to start off on, by clutch and engine or by grip
     slope: km/h -> highest slope at that speed, in the best gear
     to_100_j: energy from the battery up to 100 km/h; repeats: how often until its window is empty, from soc_start
+    engine_model: of what is driven; top speeds and slopes are by the file's full load
+    fills: the machine adds no more than what the engine lacks of its steady full load
     curves: the forces of `forces_of`; trace: (step, column) of the run from rest, see _pull_kernels
     """
 
@@ -51,13 +69,18 @@ class Performance(Shown):
     slope: Mapping[int, float]
     to_100_j: float | None
     repeats: float | None
-    curves: "Curves"
+    curves: Curves
     trace: Array
+    in_gear_j: Mapping[tuple[int, int, int], float | None]
+    engine_model: EngineModel = "map"
+    fills: bool = False
 
     @property
     def name(self) -> str:
-        """The car's name, and whether its machine helps."""
-        return f"{self.car.name}, e-boost" if self.boosts else self.car.name
+        """The car's name, how its engine is modelled, and whether its machine helps."""
+        model = ", mean value" if self.engine_model == "mean_value" else ""
+        help_ = ", hole filled" if self.fills else ", e-boost" if self.boosts else ""
+        return f"{self.car.name}{model}{help_}"
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -68,98 +91,143 @@ class Performance(Shown):
         }
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Curves(Shown):
-    """Forces at the tyres over speed; speed_mps: (speed,), by_gear_n: (gear, speed), NaN where the engine cannot.
+class _Floored(NamedTuple):
+    """A car at full pedal, as all its manoeuvres have it; ways: of every gear."""
 
-    resistance_n: (speed,) on a level road; grip_n: what the driven axle holds at steady speed
-    """
-
-    speed_mps: Array
-    by_gear_n: Array
-    resistance_n: Array
-    grip_n: float
+    car: Architecture
+    driven: LoopCar
+    ways: Indices
+    foot: Foot
+    start_j: float
+    engine_model: EngineModel
 
 
 def performance(
     car: Architecture,
     *,
     boosts: bool = False,
+    fills: bool = False,
     added_kg: float = 0.0,
     boost_lag_s: float = 0.0,
     handling: Handling | None = None,
+    engine_model: EngineModel = "map",
 ) -> Performance:
     """How fast a car is; boosts: whether its machine helps (e_boost); added_kg: people and load.
 
+    fills: the machine adds only what the engine lacks of its steady full load while its boost comes
     boost_lag_s: time constant by which full load comes, 0 for a steady map, which is too quick in the first seconds
+    engine_model: "map", or "mean_value", whose turbocharger has a lag of its own
     DataError for a car whose driveline cannot be driven forward, and for boost that its functions lack.
     """
-    handling = handling or Handling()
-    _check(car, boosts, added_kg, boost_lag_s, handling)
-    heavy = replace(car.vehicle, mass_kg=car.vehicle.mass_kg + added_kg)
-    car, line = replace(car, vehicle=heavy), line_of(car)
+    handling = handling or car.handling
+    _check(car, boosts or fills, added_kg, boost_lag_s, handling, engine_model)
+    loaded, line = _loaded(car, added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
-    driven = loop_car(car, line, handling._replace(shifting=shifting))
+    driven = loop_car(loaded, line, handling._replace(shifting=shifting))
     foot = Foot(
-        LAUNCH_RPM / RPM_PER_RADPS,
-        UP_RPM / RPM_PER_RADPS,
-        boosts,
-        float(boost_lag_s),
+        LAUNCH_RPM / RPM_PER_RADPS, UP_RPM / RPM_PER_RADPS, boosts or fills, fills, float(boost_lag_s),
         _NATURAL_SHARE,
-    )
-    by_gear = _by_gear(line)
+    )  # fmt: skip
     start_j = float(energy_j(car.battery, car.soc_start))
-    trace = _pulled(driven, by_gear, foot, (0.0, 0, start_j))
-    curves = forces_of(car, line, driven, boosts)
-    engine = forces_of(car, line, driven, False) if boosts else curves
-    to_100 = _first(trace[:, col.SPEED], 100 / KMH_PER_MPS)
-    used = None if to_100 is None else start_j - _stored_j(trace, to_100)
-    window = start_j - float(energy_j(car.battery, car.battery.soc_min))
+    floored = _Floored(loaded, driven, by_gear(line), foot, start_j, engine_model)
+    trace = _pulled(floored, 0.0, 0, max(SPEEDS_KMH), max(DISTANCES_M))
+    curves = forces_of(loaded, line, driven, boosts)
+    engine = forces_of(loaded, line, driven, False) if boosts else curves
+    in_gear = _in_gear(floored)
+    used, helps = _to_100_j(trace, start_j), boosts or fills
     return Performance(
-        car,
-        boosts,
+        loaded,
+        helps,
         {kmh: _first(trace[:, col.SPEED], kmh / KMH_PER_MPS) for kmh in SPEEDS_KMH},
         {distance: _at_distance(trace, distance) for distance in DISTANCES_M},
-        _in_gear(driven, by_gear, foot, start_j),
-        {gear + 1: _top(engine, gear) for gear in range(len(by_gear))},
-        _start_slope(car, driven, handling),
-        {kmh: _slope(car, curves, kmh / KMH_PER_MPS, handling) for kmh in SUSTAINED_KMH},
+        {case: None if at is None else at[0] for case, at in in_gear.items()},
+        {gear + 1: top_mps(engine, gear) for gear in range(len(floored.ways))},
+        start_slope(loaded, driven, handling),
+        {kmh: slope_at(loaded, curves, kmh / KMH_PER_MPS, handling) for kmh in SUSTAINED_KMH},
         used,
-        window / used if boosts and used else None,
+        _repeats(car, start_j, used) if helps and used else None,
         curves,
         trace,
+        {case: None if at is None else at[1] for case, at in in_gear.items()},
+        engine_model,
+        fills,
     )
+
+
+def _loaded(car: Architecture, added_kg: float) -> Architecture:
+    """The car with people and load, under which its tyres roll harder in proportion to the weight."""
+    vehicle = car.vehicle
+    mass_kg = vehicle.mass_kg + added_kg
+    r0, r1, r2, r3 = (mass_kg / vehicle.mass_kg * r for r in vehicle.rolling_n)
+    return replace(car, vehicle=replace(vehicle, mass_kg=mass_kg, rolling_n=(r0, r1, r2, r3)))
 
 
 def _check(
-    car: Architecture, boosts: bool, added_kg: float, boost_lag_s: float, handling: Handling
-) -> None:
+    car: Architecture, boosts: bool, added_kg: float, boost_lag_s: float, handling: Handling,
+    engine_model: str,
+) -> None:  # fmt: skip
     if boosts and "e_boost" not in car.functions:
         raise DataError(f"{car.name}: e_boost is none of this car's functions; leave --boost out")
     if not -200 <= added_kg <= 5000 or not 0 <= boost_lag_s <= 10:
         raise DataError(
             f"added mass {added_kg:g} kg, boost lag {boost_lag_s:g} s; allowed: -200 to 5000 kg, 0 to 10 s"
         )
+    check_engine_model(engine_model)
+    if engine_model == "mean_value" and boost_lag_s > 0:
+        raise DataError(
+            f"boost lag {boost_lag_s:g} s beside engine model mean_value, whose turbocharger has a lag of its own; "
+            "leave one of them out"
+        )
     handling.check()
 
 
-def _by_gear(line: Line) -> Indices:
-    """The way of each gear at full pedal: where the machine has gears of its own, the next one not below."""
-    found = []
-    for gear in dict.fromkeys(gear for gear, _, _ in line.keys):
-        fits = [n for n, (g, _, opened) in enumerate(line.keys) if g == gear and not opened]
-        chosen = [[g for _, g in line.keys[n][1]] for n in fits]
-        above = [n for n, own in zip(fits, chosen, strict=True) if all(g >= gear for g in own)]
-        found.append(min(above, key=lambda n: line.keys[n][1]) if above else fits[-1])
-    return np.array(found, dtype=np.int64)
-
-
 def _pulled(
-    driven: LoopCar, by_gear: Indices, foot: Foot, start: tuple[float, int, float]
+    floored: _Floored, speed_mps: float, place: int, until_kmh: float, until_m: float = 0.0
 ) -> Array:
+    """The record of a run from a speed in a gear; a mean-value engine's ends where speed and distance are."""
+    driven, ways, foot = floored.driven, floored.ways, floored.foot
+    start = speed_mps, place, floored.start_j
     record: Array = np.zeros((round(_LONGEST_S / STEP_S), col.COLUMNS))
-    col.pull(driven, by_gear, foot, start, STEP_S, record)
+    if floored.engine_model == "map":
+        col.pull(driven, ways, foot, start, STEP_S, record)
+        return record
+    moved, work = col.pull_begun(driven, ways, foot, start), col.pull_work(driven)
+    breathing = Breathing(
+        floored.car, moved.state.side_radps, _torque_before(floored, speed_mps, place)
+    )
+    piece = round(_PIECE_S / STEP_S)
+    for first in range(0, len(record), piece):
+        part = record[first : first + piece]
+        moved = breathing.pull(driven, ways, foot, work, moved, STEP_S, part)
+        if moved.state.speed_mps >= until_kmh / KMH_PER_MPS and moved.distance_m >= until_m:
+            return record[: first + piece]
     return record
+
+
+def _torque_before(floored: _Floored, speed_mps: float, place: int) -> float:
+    """What the engine gives at constant speed in a gear, on a level road; 0 at rest, before a launch."""
+    if speed_mps == 0.0:
+        return 0.0
+    ways, way, body, limits = (
+        floored.driven.ways, floored.ways[place], floored.driven.body, floored.driven.limits,
+    )  # fmt: skip
+    through = ways.wheel[way, -1] * ways.wheel_yield[way, 0, -1] / body.radius_m
+    torque = float(resistance(speed_mps, 0.0, body)[0] / through)
+    if len(limits.load_nm):
+        side = ways.wheel[way, -1] * speed_mps / body.radius_m
+        torque -= ways.side[way, 1] * float(tabulated(limits.load_nm[0], limits.engine_step, side))
+    return torque
+
+
+def _to_100_j(trace: Array, start_j: float) -> float | None:
+    """Energy from the battery up to 100 km/h."""
+    to_100 = _first(trace[:, col.SPEED], 100 / KMH_PER_MPS)
+    return None if to_100 is None else start_j - _stored_j(trace, to_100)
+
+
+def _repeats(car: Architecture, start_j: float, used_j: float) -> float:
+    """How often an energy is there above the window's lower end."""
+    return (start_j - float(energy_j(car.battery, car.battery.soc_min))) / used_j
 
 
 def _stored_j(trace: Array, at_s: float) -> float:
@@ -188,95 +256,24 @@ def _at_distance(trace: Array, distance_m: float) -> tuple[float, float] | None:
     return time, float(np.interp(time, _times(trace), trace[:, col.SPEED]))
 
 
-def _in_gear(
-    driven: LoopCar, by_gear: Indices, foot: Foot, start_j: float
-) -> dict[tuple[int, int, int], float | None]:
-    """Times from third gear on, and 40 to 80 km/h in fourth; None where the engine turns too slowly or fast."""
-    held = foot._replace(up_radps=np.inf)
-    cases = [(gear, *pair) for gear in range(3, len(by_gear) + 1) for pair in IN_GEAR_KMH]
-    if len(by_gear) >= 4:
+def _in_gear(floored: _Floored) -> dict[tuple[int, int, int], tuple[float, float] | None]:
+    """Time and energy from the battery, from third gear on, and 40 to 80 km/h in fourth.
+
+    None where the engine turns too slowly or fast, or the speed is not reached.
+    """
+    driven, ways = floored.driven, floored.ways
+    held = floored._replace(foot=floored.foot._replace(up_radps=np.inf))
+    cases = [(gear, *pair) for gear in range(3, len(ways) + 1) for pair in IN_GEAR_KMH]
+    if len(ways) >= 4:
         cases.append((4, *FOURTH_KMH))
-    found: dict[tuple[int, int, int], float | None] = {}
+    found: dict[tuple[int, int, int], tuple[float, float] | None] = {}
     for gear, low, high in cases:
-        ratio = driven.ways.wheel[by_gear[gear - 1], -1] / driven.body.radius_m / KMH_PER_MPS
-        slow, fast = (
-            ratio * low < driven.limits.idle_radps,
-            ratio * high > driven.limits.engine_max_radps,
-        )
-        if slow or fast:
-            found[gear, low, high] = None
+        ratio = driven.ways.wheel[ways[gear - 1], -1] / driven.body.radius_m / KMH_PER_MPS
+        found[gear, low, high] = None
+        if ratio * low < driven.limits.idle_radps or ratio * high > driven.limits.engine_max_radps:
             continue
-        trace = _pulled(driven, by_gear, held, (low / KMH_PER_MPS, gear - 1, start_j))
-        found[gear, low, high] = _first(trace[:, col.SPEED], high / KMH_PER_MPS)
+        trace = _pulled(held, low / KMH_PER_MPS, gear - 1, high)
+        time = _first(trace[:, col.SPEED], high / KMH_PER_MPS)
+        if time is not None:
+            found[gear, low, high] = time, floored.start_j - _stored_j(trace, time)
     return found
-
-
-def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> Curves:
-    """Highest force in each gear at steady speed, engine at full load, the machine's as well where it helps."""
-    ways, radius, limits = line.ways, car.vehicle.tyre_radius_m, driven.limits
-    speed = np.linspace(0.1, 300 / KMH_PER_MPS, 1200)
-    wheel = speed / radius
-    by_gear = []
-    for way in _by_gear(line):
-        ratio = ways.wheel[way, -1]
-        side = np.maximum(ratio * wheel, LAUNCH_RPM / RPM_PER_RADPS if way == 0 else 0.0)
-        full = _tabulated(limits.full_nm, limits.engine_step, side)
-        machine_speed = ways.wheel[way, 1] * wheel + ways.side[way, 1] * side
-        machine = np.zeros_like(speed)
-        if len(limits.load_nm):
-            machine = _tabulated(limits.load_nm, limits.engine_step, machine_speed)
-        elif boosts:
-            machine = _tabulated(limits.high_nm, limits.machine_step, machine_speed)
-        on_side = full + ways.side[way, 1] * machine
-        torque = ratio * ways.wheel_yield[way, 0, -1] * on_side
-        torque += ways.wheel[way, 1] * ways.wheel_yield[way, 0, 1] * machine
-        known = (side >= limits.idle_radps) & (side <= limits.engine_max_radps)
-        by_gear.append(np.where(known, torque / radius, np.nan))
-    powers = speed ** np.arange(4)[:, None]
-    resistance = (np.array(driven.body.rolling_n) + np.array(driven.body.air_n)) @ powers
-    tyre = driven.body.tyre
-    grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
-    return Curves(speed, np.array(by_gear), resistance, float(grip))
-
-
-def _tabulated(values: Array, step: float, speed: float | Array) -> Array:
-    """A torque that is tabulated over even steps of speed, rad/s."""
-    return np.asarray(np.interp(speed, step * np.arange(len(values)), values))
-
-
-def _top(curves: Curves, gear: int) -> float:
-    """Highest speed at which a gear's force still meets the resistance."""
-    enough = np.flatnonzero(curves.by_gear_n[gear] >= curves.resistance_n)
-    if not len(enough):
-        return 0.0
-    k = int(enough[-1])
-    if k + 1 == len(curves.speed_mps) or np.isnan(curves.by_gear_n[gear, k + 1]):
-        return float(curves.speed_mps[k])
-    over = curves.by_gear_n[gear, k : k + 2] - curves.resistance_n[k : k + 2]
-    return float(np.interp(0.0, over[::-1], curves.speed_mps[k : k + 2][::-1]))
-
-
-def _slope(car: Architecture, curves: Curves, speed_mps: float, handling: Handling) -> float:
-    """Highest slope, rise over run, held at a speed: by force in the best gear, and by grip."""
-    at_speed = partial(np.interp, speed_mps, curves.speed_mps)
-    forces = [float(at_speed(force)) for force in curves.by_gear_n]
-    spare = max(filter(np.isfinite, forces), default=0.0) - float(at_speed(curves.resistance_n))
-    return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
-
-
-def _start_slope(car: Architecture, driven: LoopCar, handling: Handling) -> float:
-    """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip."""
-    limits, ways = driven.limits, driven.ways
-    launch = LAUNCH_RPM / RPM_PER_RADPS
-    full = float(_tabulated(limits.full_nm, limits.engine_step, launch))
-    passed = min(full, handling.clutch.slipping_nm)
-    force = ways.wheel[0, -1] * ways.wheel_yield[0, 0, -1] * passed / driven.body.radius_m
-    spare = force - driven.body.rolling_n[0]
-    return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
-
-
-def _tangent(sine: float, handling: Handling) -> float:
-    """Rise over run of a force over weight, no more than grip holds with the load that the slope moves."""
-    tyre = handling.tyre
-    grip = tyre.friction * tyre.driven_share / (1 + tyre.friction * tyre.height_share)
-    return float(min(np.tan(np.arcsin(min(max(sine, 0.0), 0.999999))), grip))

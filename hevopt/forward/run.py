@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.car.handling import Clutch, Shifting, Tyre, check_ranges
+from hevopt.car.handling import Clutch, DriverGains, Handling, Shifting, Tyre
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
@@ -15,8 +15,8 @@ from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._contact_kernels import Body
-from hevopt.forward._pedal_kernels import DriverGains
 from hevopt.forward.books import Books, books_of
+from hevopt.forward.breathing import Breathing, EngineModel, breathing_of
 from hevopt.forward.limits import limits_of
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.plans import ForwardPlan
@@ -29,21 +29,6 @@ _Part = TypeVar("_Part", Tyre, Clutch, Shifting, DriverGains)
 STEP_S = 0.01
 STEP_RANGE_S = (0.001, 0.1)
 STEPS_MAX = 20_000_000
-
-
-class Handling(NamedTuple):
-    """Tyres, clutch, gear changes and driver of a car; shifting None: by the kind of its gearbox."""
-
-    tyre: Tyre = Tyre()
-    clutch: Clutch = Clutch()
-    shifting: Shifting | None = None
-    driver: DriverGains = DriverGains()
-
-    def check(self) -> None:
-        """DataError for a figure of tyres, clutch or gear changes that is out of range."""
-        for part in (self.tyre, self.clutch, self.shifting):
-            if part is not None:
-                check_ranges(part)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -76,6 +61,20 @@ class ForwardRun(Shown):
     def fuel_kg(self) -> float:
         """Fuel burnt, starts included."""
         return float(np.nansum(self.books.flows["fuel_kgps"])) * self.step_s + self.start_fuel_kg
+
+    @property
+    def against_map_percent(self) -> float | None:
+        """Fuel of the mean-value engine against the steady map's at the same torques and speeds; None by the map.
+
+        Steps outside a measured map, of which that knows no fuel, are left out.
+        """
+        flows = self.books.flows
+        if "map_fuel_kgps" not in flows:
+            return None
+        known = np.isfinite(flows["map_fuel_kgps"])
+        by_map = float(np.sum(flows["map_fuel_kgps"][known]))
+        own = float(np.sum(flows["fuel_kgps"][known]))
+        return 100 * (own / by_map - 1) if by_map > 0 else None
 
     @property
     def nox_kg(self) -> float:
@@ -118,9 +117,8 @@ class ForwardRun(Shown):
 
 
 def shifting_of(car: Architecture) -> Shifting:
-    """The gap of the gearbox's file; none where each half of the gears has a clutch of its own."""
-    own = 0.0 if car.gearbox is None else car.gearbox.shift_gap_s
-    return Shifting(gap_s=0.0 if len(car.driveline.driver_clutches) > 1 else own)
+    """How its files have this car change gear."""
+    return car.handling.shifting or Shifting(gap_s=car.shift_gap_s)
 
 
 def follow(
@@ -131,23 +129,29 @@ def follow(
     step_s: float = STEP_S,
     handling: Handling | None = None,
     line: Line | None = None,
+    engine_model: EngineModel = "map",
 ) -> ForwardRun:
     """The car driven along the cycle, engine and gears as planned.
 
     step_s: 0.001 to 0.1 s, shortened so that a whole number of steps fills the cycle; line: `line_of(car)`
+    engine_model: "map", or "mean_value", whose air limits the torque, and whose fuel counts
     A trace that cannot be followed is driven on; the run's `quality` says where it was left. DataError for a step
     or a figure out of range, a driveline that cannot be driven forward, and a battery that empties on the way.
     """
     line, handling = line or line_of(car), whole_handling(car, handling)
     exact_s, record = steps_of(cycle, step_s, handling)
-    driven, task = loop_car(car, line, handling), task_of(cycle, plan, cycle.time_s)
-    col.drive(driven, task, float(plan.energy_j[0]), exact_s, record)
-    return run_of(car, cycle, task, plan.energy_j, line, handling, record, exact_s)
+    task = task_of(car, cycle, plan, cycle.time_s)
+    driven = loop_car(car, line, handling, task.load_w)
+    breathing = breathing_of(car, engine_model, start_radps(car, line, cycle, task))
+    loop = col.begun(driven, task, float(plan.energy_j[0]))
+    advance = col.advance if breathing is None else breathing.advance
+    advance(driven, task, col.work_of(driven.ways), loop, 0, record, exact_s)
+    return run_of(car, cycle, task, plan.energy_j, line, handling, record, exact_s, breathing)
 
 
 def whole_handling(car: Architecture, handling: Handling | None) -> Handling:
-    """Handling with how this car changes gear."""
-    handling = handling or Handling()
+    """Handling, of the car's files where none is given, with how this car changes gear."""
+    handling = handling or car.handling
     return handling._replace(shifting=handling.shifting or shifting_of(car))
 
 
@@ -158,8 +162,10 @@ def steps_of(cycle: Cycle, step_s: float, handling: Handling) -> tuple[float, Ar
     return cycle.duration_s / count, np.zeros((count, col.COLUMNS))
 
 
-def loop_car(car: Architecture, line: Line, handling: Handling) -> LoopCar:
-    """A car as the compiled loops read it; handling: that of `whole_handling`."""
+def loop_car(
+    car: Architecture, line: Line, handling: Handling, load_w: Array | None = None
+) -> LoopCar:
+    """A car as the compiled loops read it; handling: that of `whole_handling`; load_w: as of a LoopTask."""
     shifting = handling.shifting or shifting_of(car)
     vehicle, pack = car.vehicle, car.battery
     body = Body(
@@ -167,8 +173,9 @@ def loop_car(car: Architecture, line: Line, handling: Handling) -> LoopCar:
         _four(vehicle.rolling_n), _four(vehicle.air_n), _floats(handling.tyre),
         _floats(handling.clutch),
     )  # fmt: skip
+    loads = None if load_w is None else (float(load_w.min()), float(load_w.max()))
     low, high = (float(energy_j(pack, end)) for end in (pack.soc_min, pack.soc_max))
-    return LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car), pack.arrays,
+    return LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car, loads), pack.arrays,
                    (low, high), _floats(shifting), _floats(handling.driver))  # fmt: skip
 
 
@@ -182,28 +189,47 @@ def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
     return a, b, c, d
 
 
-def task_of(cycle: Cycle, plan: ForwardPlan, from_s: Array) -> LoopTask:
+def task_of(car: Architecture, cycle: Cycle, plan: ForwardPlan, from_s: Array) -> LoopTask:
     """A trace and its plan as the compiled loop reads them; from_s: (step + 1,) times of the plan's steps."""
 
     def own(values: Array) -> Array:
         return np.array(values, dtype=np.float64)
 
     return LoopTask(
-        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), own(from_s), plan.way,
+        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), _loads_w(car, cycle),
+        own(from_s), plan.way,
         plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j,
     )  # fmt: skip
 
 
+def _loads_w(car: Architecture, cycle: Cycle) -> Array:
+    """(2, time) electric load while the engine is at rest and while it turns: the cycle's, or the car's own."""
+    if cycle.auxiliary_w is not None:
+        return np.array([cycle.auxiliary_w[:-1]] * 2, dtype=np.float64)
+    own = [[car.vehicle.load_w(engine_on=on)] for on in (False, True)]
+    return np.repeat(np.array(own, dtype=np.float64), len(cycle.time_s) - 1, axis=1)
+
+
+def start_radps(car: Architecture, line: Line, cycle: Cycle, task: LoopTask) -> float:
+    """Speed at which the engine turns, or would if it did, as the cycle begins."""
+    wheel_radps = float(cycle.speed_mps[0]) / car.vehicle.tyre_radius_m
+    return float(max(car.engine.idle_radps, line.ways.wheel[task.way[0], -1] * wheel_radps))
+
+
 def run_of(
     car: Architecture, cycle: Cycle, task: LoopTask, planned_j: Array, line: Line, handling: Handling,
-    record: Array, step_s: float,
+    record: Array, step_s: float, breathing: Breathing | None = None,
 ) -> ForwardRun:  # fmt: skip
     """What a loop has recorded, judged; planned_j: (time + 1,) stored energy that was planned over the cycle."""
     start_mps, on = float(cycle.speed_mps[0]), bool(task.engine_on[0])
-    turns = line.ways.wheel[task.way[0], -1] * start_mps / car.vehicle.tyre_radius_m
-    side = max(car.engine.idle_radps, turns) if on else 0.0
-    books = books_of(car, line, record, (start_mps, side, float(planned_j[0])), step_s)
+    side = start_radps(car, line, cycle, task) if on else 0.0
+    breath = None if breathing is None else breathing.breath
     time_s = cycle.time_s[0] + step_s * np.arange(len(record) + 1)
+    at = np.searchsorted(cycle.time_s, time_s[:-1] + 1e-9, "right") - 1
+    rests = record[:, col.PHASE] == motor.REST
+    load_w = task.load_w[np.where(rests, 0, 1), np.minimum(at, task.load_w.shape[1] - 1)]
+    start = start_mps, side, float(planned_j[0])
+    books = books_of(car, line, record, start, step_s, load_w, breath)
     _check_charge(car, books, time_s)
     speed = np.append(start_mps, record[:, col.SPEED])
     wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)
@@ -223,11 +249,6 @@ def _check(cycle: Cycle, step_s: float, handling: Handling) -> None:
     low, high = STEP_RANGE_S
     if not low <= step_s <= high:
         raise DataError(f"step {step_s:g} s; allowed: {low:g} to {high:g} s")
-    if cycle.auxiliary_w is not None:
-        raise DataError(
-            f"cycle {cycle.name}: its column auxiliary_power_w cannot be driven forward yet; take it out for this, "
-            "and give the car's file a mean load"
-        )
     if cycle.duration_s / step_s > STEPS_MAX:
         raise DataError(
             f"cycle {cycle.name}: {cycle.duration_s / step_s:.3g} steps of {step_s:g} s; allowed: {STEPS_MAX:g}; "

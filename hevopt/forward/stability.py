@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from hevopt.car.handling import Tyre
+from hevopt.car.handling import DriverGains, Tyre
 from hevopt.errors import DataError
 from hevopt.forward._contact_kernels import pace_of
-from hevopt.forward._pedal_kernels import DriverGains
 
 
 def spectral_radius(driver: DriverGains, tyre: Tyre, step_s: float) -> float:

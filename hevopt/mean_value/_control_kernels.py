@@ -48,7 +48,8 @@ _LOOP_CLOSES_OVER, _SATURATES_OVER = 0.05, 0.02
 
 class Command(NamedTuple):
     """What the control unit asks for: fuel flow, vane and valve opening, rate of the boost integral; and what is
-    behind it: full-load torque, fuel demanded and allowed by the smoke limit per cycle, boost target."""
+    behind it: full-load torque, fuel demanded and allowed by the smoke limit per cycle, boost target; and the
+    most fuel flow that smoke limit and exhaust leave."""
 
     fuel: float
     vanes: float
@@ -58,6 +59,7 @@ class Command(NamedTuple):
     demanded: float
     allowed: float
     target: float
+    most: float
 
 
 @compiled(inline="always")
@@ -106,7 +108,8 @@ def command(
     smoke = curve(speed, SMOKE, curves)
     allowed = max(seen, 0.0) * per_cycle / (cylinders.stoichiometric_air * smoke)
     hot = (outlet.temperature - control.exhaust_temperature_max_k) / _DERATED_OVER_K
-    fuel = max(min(demanded, allowed), 0.0) * min(max(1.0 - hot, 0.0), 1.0)
+    cooled = min(max(1.0 - hot, 0.0), 1.0)
+    fuel = max(min(demanded, allowed), 0.0) * cooled
     target = boost_target(speed, pedal, demanded, curves, control, cylinders, gas)
     error = target - inlet.pressure
     base = curve(speed, VANES, curves)
@@ -122,4 +125,5 @@ def command(
     fading = control.egr_closed_radps - control.egr_fades_radps
     egr *= min(max((control.egr_closed_radps - speed) / fading, 0.0), 1.0)
     egr *= min(max((allowed / max(demanded, 1e-12) - 1.0) / _NEAR_SMOKE, 0.0), 1.0)
-    return Command(fuel / per_cycle, vanes, egr, rate, full_load, demanded, allowed, target)
+    most = allowed * cooled / per_cycle
+    return Command(fuel / per_cycle, vanes, egr, rate, full_load, demanded, allowed, target, most)

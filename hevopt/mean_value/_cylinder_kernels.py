@@ -23,6 +23,8 @@ _FOUR_PI = 4.0 * pi
 _RESIDUAL_EXPONENT = 1.0 / 1.35
 _RADPS_1000RPM = 2000.0 * pi / 60.0
 _LAMBDA_MOST = 1e3
+# Newton's steps to the fuel of a torque, and the share of its work that may be left.
+_FUEL_STEPS, _FUEL_SHARE = 12, 1e-13
 
 
 class Combustion(NamedTuple):
@@ -55,6 +57,41 @@ def friction_pa(speed: float, cylinders: Cylinders) -> float:
     """Mean pressure of friction, equation (16)."""
     piston = cylinders.stroke_m * speed / pi
     return cylinders.friction_pa + cylinders.friction_pa_s2pm2 * piston * piston
+
+
+@compiled(inline="always")
+def _lost_nm(speed: float, inlet: State, outlet: State, cylinders: Cylinders) -> float:
+    """Torque of pumping and friction."""
+    # Per rad of crank: mean pressure times displacement over 4 pi is a torque.
+    per_pa = cylinders.displacement_m3 / _FOUR_PI
+    turns = speed / (2.0 * _RADPS_1000RPM)
+    pumping = outlet.pressure - inlet.pressure + cylinders.gas_exchange_pa * turns * turns
+    return pumping * per_pa + friction_pa(speed, cylinders) * per_pa
+
+
+@compiled()
+def fuel_of(
+    torque: float, speed: float, flow: float, inlet: State, outlet: State, cylinders: Cylinders
+) -> float:
+    """The flow of fuel that gives a torque: `combustion` turned round, by Newton; no more than the air burns.
+
+    Torque grows ever less with fuel, so that steps from below, the fuel that would lose nothing, never pass it.
+    """
+    work = (torque + _lost_nm(speed, inlet, outlet, cylinders)) * max(speed, 1.0)
+    most = max(flow * (1.0 - inlet.burnt), 0.0) / cylinders.stoichiometric_air
+    if work <= 0.0 or most <= 0.0:
+        return 0.0
+    per_fuel = cylinders.efficiency * cylinders.heating_value_jpkg
+    fuel = min(work / per_fuel, most)
+    for _ in range(_FUEL_STEPS):
+        excess = most / fuel
+        lost = cylinders.rich_loss * exp(-(excess - 1.0) / cylinders.rich_width)
+        lacking = work - per_fuel * fuel * (1.0 - lost)
+        slope = per_fuel * (1.0 - lost * (1.0 + excess / cylinders.rich_width))
+        if lacking <= _FUEL_SHARE * work or slope <= 0.0:
+            break
+        fuel = min(fuel + lacking / slope, most)
+    return fuel
 
 
 @compiled()

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hevopt._compile import compiled
 from hevopt.mean_value import states as s
 from hevopt.mean_value._control_kernels import Command, command
-from hevopt.mean_value._cylinder_kernels import Combustion, combustion, filling
+from hevopt.mean_value._cylinder_kernels import Combustion, combustion, filling, fuel_of
 from hevopt.mean_value._gas_kernels import (
     State,
     carried,
@@ -100,6 +100,33 @@ def _assist(y: Vector, brake: float, full: float, pedal: float, model: Model) ->
 
 
 @compiled(inline="always")
+def _fuel(
+    asked: Command, speed: float, into: float, three: State, four: State, model: Model
+) -> float:
+    """Flow of fuel: what the pedal asks, or what gives the torque of somebody else's wish."""
+    if isnan(model.drive.torque_nm):
+        return asked.fuel
+    wanted = fuel_of(model.drive.torque_nm, speed, into, three, four, model.engine.cylinders)
+    return min(wanted, max(asked.most, 0.0))
+
+
+@compiled()
+def combustion_now(y: Vector, model: Model) -> Combustion:
+    """What burns at a state whose pedal rests."""
+    engine, gas = model.engine, model.gas
+    three = state_of(y, 6, engine.volumes.intake_manifold_m3, gas)
+    four = state_of(y, 9, engine.volumes.exhaust_manifold_m3, gas)
+    speed = max(y[s.ENGINE], 0.0)
+    into = filling(speed, three, four, engine.cylinders)
+    asked = command(
+        speed, _pedal(0.0, y, model.drive), into, y[s.METER], y[s.BOOST], three, four,
+        model.curves, model.control, engine.cylinders, gas,
+    )  # fmt: skip
+    fuel = _fuel(asked, speed, into, three, four, model)
+    return combustion(speed, into, fuel, three, four, engine.cylinders)
+
+
+@compiled(inline="always")
 def flows(t: float, y: Vector, model: Model) -> Flows:
     """All flows, torques and commands at time t and state y."""
     engine, gas = model.engine, model.gas
@@ -118,7 +145,8 @@ def flows(t: float, y: Vector, model: Model) -> Flows:
         speed, pedal, into, y[s.METER], y[s.BOOST], three, four,
         model.curves, model.control, cylinders, gas,
     )  # fmt: skip
-    burning = combustion(speed, into, asked.fuel, three, four, cylinders)
+    fuel = _fuel(asked, speed, into, three, four, model)
+    burning = combustion(speed, into, fuel, three, four, cylinders)
     brake = pedal * asked.full_load if model.drive.from_map > 0.0 else burning.torque
     clutch = _clutch(y, model.car)
     return Flows(
@@ -209,6 +237,7 @@ def _car_rates(f: Flows, y: Vector, dy: Vector, model: Model) -> None:
     if not isnan(drive.seek_nm):
         dy[s.PEDAL] = (drive.seek_nm - f.combustion.torque) / (_SEEKING_S * f.command.full_load)
     if drive.held > 0.0:
+        dy[s.ENGINE] = drive.engine_radps2
         return
     wheels = f.clutch * car.ratio_radpm * car.efficiency
     wheels += f.assist * car.assist_ratio_radpm * car.assist_efficiency

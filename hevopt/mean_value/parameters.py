@@ -244,15 +244,19 @@ class Drive(NamedTuple):
     """What is done with the car.
 
     held: 1 keeps engine and road speed as they are, as a dynamometer does
+    engine_radps2: how fast the engine's speed changes there, where somebody else turns it
     seek_nm: pedal moves until the engine gives this torque; NaN: it does not
     pedal_rate_ps: pedal moved from time 0 on, up to 1
     from_map: 1 drives with the torque that a steady map gives at once, pedal times full load; the gas rests
+    torque_nm: fuel is what gives this torque, as far as the limits of smoke and exhaust let it; NaN: by the pedal
     """
 
     held: float = 0.0
     seek_nm: float = np.nan
     pedal_rate_ps: float = 0.0
     from_map: float = 0.0
+    torque_nm: float = np.nan
+    engine_radps2: float = 0.0
 
 
 class Diesel(NamedTuple):

@@ -11,7 +11,7 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.run import ForwardRun
 from hevopt.output.tables import number, titled_table
 from hevopt.studies.driven import DrivenPlan
-from hevopt.units import KMH_PER_MPS
+from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,6 +101,7 @@ def notes(driven: DrivenPlan) -> str:
         f"drive quality (SAE J2951): RMSSE {q.speed_error_mps * KMH_PER_MPS:.3f} km/h, "
         f"ER {q.energy_percent:+.2f} %, DR {q.distance_percent:+.3f} %, EER {q.energy_economy_percent:+.2f} %, "
         f"ASCR {q.speed_change_percent:+.2f} %, IWR {q.inertial_work_percent:+.2f} %",
+        *engine_text(run),
         trace_text(run),
         f"at full load {run.full.sum() * run.step_s:.1f} s; "
         f"distance {run.distance_m - run.cycle.distance_m:+.2f} m; "
@@ -126,6 +127,23 @@ def how_text(driven: DrivenPlan) -> str:
     )
 
 
+def engine_text(run: ForwardRun) -> list[str]:
+    """What the mean-value engine did otherwise than the map; nothing by the map."""
+    if run.against_map_percent is None:
+        return []
+    flows = run.books.flows
+    work = np.abs(flows["engine_torque_nm"] * flows["engine_speed_radps"]).sum()
+    lacking = np.abs(flows["gas_lacking_nm"] * flows["engine_speed_radps"]).sum()
+    turns, rpm = run.engine == motor.TURNING, flows["turbo_speed_radps"] * RPM_PER_RADPS / 1e3
+    return [
+        f"engine: mean-value model; fuel {run.against_map_percent:+.2f} % against the map's at the same torques "
+        f"and speeds; least lambda {flows['excess_air'][turns].min():.2f}, "
+        f"turbocharger up to {rpm.max():.0f} 1000/min; "
+        f"torque that its air could not keep within a step: {100 * lacking / max(work, 1e-9):.2g} % of its work; "
+        "NOx by the map"
+    ]
+
+
 def trace_text(run: ForwardRun) -> str:
     """Where and for how long the trace was left by more than its tolerance."""
     left = run.quality.violations
@@ -149,6 +167,8 @@ def as_dict(driven: DrivenPlan) -> dict[str, Any]:
         "cycle": run.cycle.name,
         "asked": None if driven.asked is None else driven.asked._asdict(),
         "step_s": run.step_s,
+        "engine_model": "map" if run.against_map_percent is None else "mean_value",
+        "fuel_against_map_percent": run.against_map_percent,
         "fuel_l_per_100km": driven.fuel_l_per_100km,
         "corrected_l_per_100km": driven.corrected_l_per_100km,
         "bound_l_per_100km": driven.bound_l_per_100km,

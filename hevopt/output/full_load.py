@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 _BAR = 1e5
 _HEADS = (
-    "rpm", "torque\nNm", "file\nNm", "less\n%", "boost\nbar", "p4\nbar", "lambda", "turbo\nkrpm", "T4\nK",
+    "rpm", "torque\nNm", "file\nNm", "of file\n%", "boost\nbar", "p4\nbar", "lambda", "turbo\nkrpm", "T4\nK",
     "air\nkg/h", "bsfc\ng/kWh", "map's\n%", "surge\nmargin", "vanes",
 )  # fmt: skip
 
@@ -29,7 +29,7 @@ def columns(found: FullLoad, engine: Engine) -> dict[str, Array]:
         "rpm": speed * RPM_PER_RADPS,
         "torque": torque,
         "file": full,
-        "less": 100 * (torque / full - 1),
+        "of file": 100 * torque / full,
         "boost": found["p3_pa"] / _BAR,
         "p4": found["p4_pa"] / _BAR,
         "lambda": found["excess_air"],
@@ -50,7 +50,7 @@ def full_load_table(found: FullLoad, engine: Engine) -> Table:
         ".0f",
         ".1f",
         ".1f",
-        "+.1f",
+        ".1f",
         ".2f",
         ".2f",
         ".2f",
@@ -70,8 +70,8 @@ def full_load_table(found: FullLoad, engine: Engine) -> Table:
 
 
 NOTES = (
-    "file: full_load of the engine's file, what the control unit asks for; less: settled torque above (+) or below "
-    "it. boost: pressure of the intake manifold, absolute; p4, T4: before the turbine; map's: fuel above (+) or "
+    "file: full_load of the engine's file, what the control unit asks for; of file: settled torque over it. "
+    "boost: pressure of the intake manifold, absolute; p4, T4: before the turbine; map's: fuel above (+) or "
     "below that of fuel_coefficients or fuel_map at the same torque; surge margin: flow over that at surge, 1 is "
     "surge; vanes: share of the turbine's open area."
 )

@@ -11,7 +11,14 @@ from hevopt.output.tables import number, titled_table
 from hevopt.units import KMH_PER_MPS
 
 # What is to be known beside every figure of the first seconds.
-NOTE = "steady map: a turbocharged engine is slower in the first seconds than this says (hevopt tipin; --boost-lag)"
+NOTE = (
+    "steady map: a turbocharged engine is slower in the first seconds than this says (--engine-model mean_value; "
+    "--boost-lag)"
+)
+MEAN_VALUE_NOTE = (
+    "mean value: begun settled, without load at launch speed and at constant speed in gear; top speed and slopes "
+    "by the file's full load; hole filled: the machine adds what the engine lacks of its steady full load, no more"
+)
 
 
 def speed_table(found: Sequence[Performance]) -> Table:
@@ -47,6 +54,18 @@ def gear_table(found: Sequence[Performance]) -> Table:
     return table
 
 
+def help_table(found: Sequence[Performance]) -> Table:
+    """What the machine takes from the battery in gear, of those whose machine helps."""
+    helped = [of for of in found if of.boosts]
+    cases = list(dict.fromkeys(case for of in helped for case in of.in_gear_j))
+    heads = (f"{gear}.\n{low}-{high}" for gear, low, high in cases)
+    table = _table("in gear, kJ from the battery", *heads)
+    for of in helped:
+        cells = (of.in_gear_j.get(case) for case in cases)
+        table.add_row(Text(of.name), *(number(None if j is None else j / 1e3, 1) for j in cells))
+    return table
+
+
 def limit_table(found: Sequence[Performance]) -> Table:
     """Top speeds of the engine alone, and slopes."""
     gears = max(len(of.top_mps) for of in found)
@@ -65,6 +84,8 @@ def as_dict(of: Performance) -> dict[str, Any]:
     return {
         "car": of.car.name,
         "e_boost": of.boosts,
+        "hole_filled": of.fills,
+        "engine_model": of.engine_model,
         "mass_kg": of.car.vehicle.mass_kg,
         "to_speed_s": {str(kmh): time for kmh, time in of.to_speed_s.items()},
         "to_distance": {
@@ -72,7 +93,13 @@ def as_dict(of: Performance) -> dict[str, Any]:
             for distance, there in of.to_distance.items()
         },
         "in_gear": [
-            {"gear": gear, "from_kmh": low, "to_kmh": high, "time_s": time}
+            {
+                "gear": gear,
+                "from_kmh": low,
+                "to_kmh": high,
+                "time_s": time,
+                "battery_j": of.in_gear_j[gear, low, high],
+            }
             for (gear, low, high), time in of.in_gear_s.items()
         ],
         "top_mps": {str(gear): top for gear, top in of.top_mps.items()},

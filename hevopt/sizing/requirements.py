@@ -10,11 +10,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from hevopt.car.architecture import Architecture
-from hevopt.car.handling import Tyre
 from hevopt.errors import DataError
 from hevopt.files.toml import FileModel
 from hevopt.forward.performance import SPEEDS_KMH, SUSTAINED_KMH, Performance, performance
-from hevopt.forward.run import Handling
 from hevopt.units import KMH_PER_MPS
 
 # Figure -> the side on which it is limited, and the keys that say which one is meant.
@@ -138,10 +136,10 @@ def _driven(car: Architecture, boost: bool, added_kg: float, trailer_kg: float) 
     vehicle = car.vehicle
     own_kg, all_kg = vehicle.mass_kg + added_kg, vehicle.mass_kg + added_kg + trailer_kg
     r0, r1, r2, r3 = (all_kg / vehicle.mass_kg * r for r in vehicle.rolling_n)
-    tyre = Tyre()
+    tyre = car.handling.tyre
     tyre = tyre._replace(driven_share=tyre.driven_share * own_kg / all_kg)
     loaded = replace(car, vehicle=replace(vehicle, mass_kg=all_kg, rolling_n=(r0, r1, r2, r3)))
-    return performance(loaded, boosts=boost, handling=Handling(tyre=tyre))
+    return performance(loaded, boosts=boost, handling=car.handling._replace(tyre=tyre))
 
 
 def _figure(run: Performance, file: RequirementFile) -> float | None:

@@ -7,14 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.handling import Handling
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.asked import Asking, follow_asked
+from hevopt.forward.breathing import EngineModel, check_engine_model
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of
-from hevopt.forward.run import STEP_S, ForwardRun, Handling, follow
+from hevopt.forward.run import STEP_S, ForwardRun, follow
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.problem import Trajectory
 from hevopt.strategies import strategy_named
@@ -40,6 +42,7 @@ class Manner(NamedTuple):
     handling: Handling | None = None
     asking: Asking = _ASKING
     replay: bool = False
+    engine_model: EngineModel = "map"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -94,21 +97,24 @@ def drive(
     handling: Handling | None = None,
     asking: Asking = _ASKING,
     replay: bool = False,
+    engine_model: EngineModel = "map",
 ) -> DrivenPlan:
     """A strategy on a car on a cycle, driven forward by a driver at the pedals.
 
     step_s: 0.001 to 0.1 s; handling: tyres, clutch, gear changes and driver
     asking: how often a strategy decides that can on the way; replay: its plan is driven, as that of all others is
+    engine_model: "map", or "mean_value", which drives with the air that the engine has and whose fuel counts
     A trace that is missed is driven on, and the run says where. DataError for what cannot be driven forward.
     """
     settings = replace(settings or Settings(), allow_shortfall=True)
     check_horizon(settings.horizon_s, [strategy])
     strategy_named(strategy)
     asking.check()
+    check_engine_model(engine_model)
     line_of(car)
     case = prepare(car, cycle, settings)
     row, _, trajectory = run_case(case, strategy, settings.horizon_s)
-    how = Manner(step_s, handling, asking, replay)
+    how = Manner(step_s, handling, asking, replay, engine_model)
     return drive_solved(case, strategy, settings.horizon_s, (row, trajectory), how)
 
 
@@ -124,13 +130,16 @@ def drive_solved(
     asked = None
     if how.replay or not decides(strategy):
         plan = replay_of(trajectory, line)
-        run = follow(car, case.cycle, plan, step_s=how.step_s, handling=how.handling, line=line)
+        run = follow(
+            car, case.cycle, plan, step_s=how.step_s, handling=how.handling, line=line,
+            engine_model=how.engine_model,
+        )  # fmt: skip
     else:
         decider = decider_of(case, strategy, horizon_s, how.asking)
         asked = decider.asking
         run = follow_asked(
             car, case.cycle, decider, trajectory,
-            step_s=how.step_s, handling=how.handling, line=line,
+            step_s=how.step_s, handling=how.handling, line=line, engine_model=how.engine_model,
         )  # fmt: skip
     _check_moved(run)
     return beside(case, strategy, row, trajectory, run, asked=asked)

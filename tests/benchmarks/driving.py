@@ -22,13 +22,14 @@ def main() -> None:
     for name in ("A", "C2", "E"):
         car, cycle, plan, _ = plan_of(name)
         line = line_of(car)
-        driven = loop_car(car, line, whole_handling(car, None))
         record = np.zeros((round(cycle.duration_s / 0.01), col.COLUMNS))
-        task = task_of(cycle, plan, cycle.time_s)
+        task = task_of(car, cycle, plan, cycle.time_s)
+        driven = loop_car(car, line, whole_handling(car, None), task.load_w)
         loops, runs = [], []
         for _ in range(REPEATS + 1):
             began = process_time()
-            col.drive(driven, task, float(plan.energy_j[0]), 0.01, record)
+            loop = col.begun(driven, task, float(plan.energy_j[0]))
+            col.advance(driven, task, col.work_of(driven.ways), loop, 0, record, 0.01)
             loops.append(process_time() - began)
             began = process_time()
             follow(car, cycle, plan, line=line)

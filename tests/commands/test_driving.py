@@ -66,8 +66,10 @@ def test_bad_input_is_one_message(hevopt, words, message):
 def test_performance_prints_times_and_draws_the_forces(hevopt, tmp_path):
     seen = hevopt("performance", "A,C2", "--boost", "--plot", "forces.svg")
     assert seen.status == 0, seen.err
-    for word in ("from rest", "in gear", "top speed and slope", "C2, e-boost", "steady map"):
+    for word in ("from rest", "in gear", "top speed and slope", "C2, e-boost", "steady map",
+                 "in gear, kJ from the battery", "A: e_boost is none of its functions"):  # fmt: skip
         assert word in seen.out
+    assert "C2: e_boost" not in seen.out
     drawn = (tmp_path / "forces.svg").read_text()
     assert drawn.startswith("<?xml") and "nan" not in drawn
     told = json.loads(hevopt("performance", "C2", "--boost", "--json").out)
@@ -81,6 +83,7 @@ def test_performance_prints_times_and_draws_the_forces(hevopt, tmp_path):
     [
         (["A", "--added-mass", "9999"], "allowed: -200 to 5000 kg"),
         (["A", "--gap", "-1"], "gap_s -1; allowed: 0 to 5"),
+        (["p2_petrol_dct", "--engine-model", "mean_value"], "has no [mean_value] part"),
         (["A", "--plot", "forces.txt"], "ends in .png, .svg or .pdf"),
         ([","], "no cars"),
     ],

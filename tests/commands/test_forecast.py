@@ -64,6 +64,22 @@ def test_the_piece_is_one_that_is_driven():
     assert piece.distance_m > 19_900
 
 
+def test_pieces_of_a_comparison_are_driven_forward_where_it_is(hevopt, monkeypatch):
+    from hevopt.studies import comparison
+
+    asked = []
+    monkeypatch.setattr(forecast, "say_how_long", lambda trace, solve: solve(trace))
+
+    def compare_cars(cars, trace, **how):
+        asked.append(how["forward"])
+        raise InfeasibleError("seen enough")
+
+    monkeypatch.setattr(comparison, "compare_cars", compare_cars)
+    for words in (("--forward",), ()):
+        assert hevopt("compare", "--architectures", "A", *words).status == 3
+    assert asked == [True, False]
+
+
 @pytest.mark.parametrize("command", ["pareto", "sensitivity"])
 def test_studies_of_long_drives_say_it_too(command, hevopt, monkeypatch):
     """Told by a drive that counts as long, and pieces that are short enough for a test."""

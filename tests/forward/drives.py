@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 
 from hevopt import drive, load_architecture, load_cycle
-from hevopt.car.handling import Shifting, Tyre
+from hevopt.car.handling import Handling, Shifting, Tyre
 from hevopt.driving.cycle import Cycle
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of
-from hevopt.forward.run import Handling, follow
+from hevopt.forward.run import follow
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import STRATEGIES
 
@@ -51,4 +51,4 @@ def ramp(top_mps, rise_s, seconds, grade=0.0):
     return Cycle("ramp", time_s, speed, np.full(seconds + 1, grade))
 
 
-__all__ = ["STIFF", "constant", "driven", "follow", "plan_of", "ramp"]
+__all__ = ["STIFF", "STRATEGY", "constant", "driven", "follow", "plan_of", "ramp"]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hevopt import DataError, load_architecture, performance
-from hevopt.car.handling import Shifting, Tyre
-from hevopt.forward.run import Handling
+from hevopt.car.handling import Handling, Shifting, Tyre
 
 
 @cache

@@ -7,9 +7,7 @@ import pytest
 from forward.drives import STIFF, constant, driven, follow, plan_of, ramp
 
 from hevopt import DataError, drive, load_architecture
-from hevopt.car.handling import Clutch, Shifting, Tyre
-from hevopt.forward._pedal_kernels import DriverGains
-from hevopt.forward.run import Handling
+from hevopt.car.handling import Clutch, DriverGains, Handling, Shifting, Tyre
 from hevopt.forward.stability import spectral_radius
 from hevopt.problem.battery import soc
 

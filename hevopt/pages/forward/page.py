@@ -11,8 +11,8 @@ from hevopt.forward.performance import (
     SUSTAINED_KMH,
     Performance,
 )
-from hevopt.output.driven_tables import audit, how_text, trace_text
-from hevopt.output.performance_tables import NOTE
+from hevopt.output.driven_tables import audit, engine_text, how_text, trace_text
+from hevopt.output.performance_tables import MEAN_VALUE_NOTE, NOTE
 from hevopt.pages.alert import Alert
 from hevopt.pages.forward.drawing import drawn_performance, drawn_run
 from hevopt.pages.render import render
@@ -61,7 +61,9 @@ def performance_page(found: Sequence[Performance], command: str) -> str:
         _packed(drawn_performance(found)),
         title="How fast: " + ", ".join(dict.fromkeys(of.car.name for of in found)),
         found=found,
-        note=NOTE,
+        note=f"{NOTE}; {MEAN_VALUE_NOTE}"
+        if any(of.engine_model != "map" for of in found)
+        else NOTE,
         speeds=SPEEDS_KMH,
         distances=DISTANCES_M,
         sustained=SUSTAINED_KMH,
@@ -100,6 +102,7 @@ def _alerts(driven: DrivenPlan) -> list[Alert]:
         Alert("Charge", bool(charge), charge or ["neutral within 1 % of the fuel's energy, in its window"]),
         Alert("Full load", full_s > 0, [given], grave=False),
         Alert("Measured maps", bool(maps), maps or ["never left"]),
+        *([Alert("Engine", True, engine_text(run), grave=False)] if engine_text(run) else []),
         Alert("Balances", bool(open_), open_ or ["every component balances to rounding"]),
         Alert("What the bound is", True, bound, grave=False),
     ]  # fmt: skip

@@ -1,0 +1,78 @@
+"""What an architecture's file may say of tyres, clutch, gear changes and driver, which only a driven car shows.
+
+What is left out is that of hevopt.car.handling, where every default stands with its source.
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from hevopt.car.handling import Clutch, DriverGains, Handling, Shifting, Tyre
+from hevopt.files.toml import FileModel
+
+Share = Annotated[float, Field(ge=0.05, le=1)]
+Torque = Annotated[float, Field(ge=1, le=1e5)]
+Gain = Annotated[float, Field(ge=0, le=1000)]
+Lag = Annotated[float, Field(ge=0.01, le=10)]
+
+
+class TyreFile(FileModel):
+    """The driven tyres."""
+
+    lag_s: Annotated[float, Field(ge=0, le=1)] | None = None
+    friction: Annotated[float, Field(ge=0.05, le=2)] | None = None
+    driven_share: Share | None = None
+    height_share: Annotated[float, Field(ge=0, le=1)] | None = None
+
+
+class ClutchFile(FileModel):
+    """The driver's clutch."""
+
+    slipping_nm: Torque | None = None
+    sticking_nm: Torque | None = None
+    slip_scale_radps: Annotated[float, Field(ge=1e-3, le=1e4)] | None = None
+    closing_s: Annotated[float, Field(ge=0, le=5)] | None = None
+
+
+class ShiftingFile(FileModel):
+    """How a gear is changed."""
+
+    gap_s: Annotated[float, Field(ge=0, le=5)] | None = None
+    ratio_lag_s: Annotated[float, Field(ge=0, le=2)] | None = None
+    between_s: Annotated[float, Field(ge=0, le=60)] | None = None
+    reversal_s: Annotated[float, Field(ge=0, le=600)] | None = None
+
+
+class DriverFile(FileModel):
+    """Who is at the pedals."""
+
+    proportional: Gain | None = None
+    integral: Gain | None = None
+    derivative: Gain | None = None
+    feed_forward: Annotated[float, Field(ge=0, le=2)] | None = None
+    preview_s: Annotated[float, Field(ge=0, le=10)] | None = None
+    hold_mps: Annotated[float, Field(ge=0, le=2)] | None = None
+    governor_s: Lag | None = None
+    start_s: Lag | None = None
+    stop_s: Lag | None = None
+    charge_per_s: Annotated[float, Field(ge=0, le=10)] | None = None
+
+
+def handling_of(
+    tyre: TyreFile | None,
+    clutch: ClutchFile | None,
+    shifting: ShiftingFile | None,
+    driver: DriverFile | None,
+    gap_s: float,
+) -> Handling:
+    """A car's handling by the tables of its file; gap_s: of a change of gear where [shifting] gives none."""
+    return Handling(
+        Tyre(**_given(tyre)),
+        Clutch(**_given(clutch)),
+        None if shifting is None else Shifting(**{"gap_s": gap_s, **_given(shifting)}),
+        DriverGains(**_given(driver)),
+    )
+
+
+def _given(table: FileModel | None) -> dict[str, float]:
+    return {} if table is None else table.model_dump(exclude_none=True)

@@ -1,0 +1,111 @@
+"""Forces at the tyres over speed, and what follows of them without driving: top speed and slopes."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.car.handling import Handling
+from hevopt.display.facts import Shown
+from hevopt.forward._acting_kernels import LoopCar
+from hevopt.forward.lines import Line
+from hevopt.problem.arrays import Array, Indices
+from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS, STANDARD_GRAVITY_MPS2
+
+LAUNCH_RPM = 1800.0
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Curves(Shown):
+    """Forces at the tyres over speed; speed_mps: (speed,), by_gear_n: (gear, speed), NaN where the engine cannot.
+
+    resistance_n: (speed,) on a level road; grip_n: what the driven axle holds at steady speed
+    """
+
+    speed_mps: Array
+    by_gear_n: Array
+    resistance_n: Array
+    grip_n: float
+
+
+def by_gear(line: Line) -> Indices:
+    """The way of each gear at full pedal: where the machine has gears of its own, the next one not below."""
+    found = []
+    for gear in dict.fromkeys(gear for gear, _, _ in line.keys):
+        fits = [n for n, (g, _, opened) in enumerate(line.keys) if g == gear and not opened]
+        chosen = [[g for _, g in line.keys[n][1]] for n in fits]
+        above = [n for n, own in zip(fits, chosen, strict=True) if all(g >= gear for g in own)]
+        found.append(min(above, key=lambda n: line.keys[n][1]) if above else fits[-1])
+    return np.array(found, dtype=np.int64)
+
+
+def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> Curves:
+    """Highest force in each gear at steady speed, engine at full load, the machine's as well where it helps."""
+    ways, radius, limits = line.ways, car.vehicle.tyre_radius_m, driven.limits
+    speed = np.linspace(0.1, 300 / KMH_PER_MPS, 1200)
+    wheel = speed / radius
+    forces = []
+    for way in by_gear(line):
+        ratio = ways.wheel[way, -1]
+        side = np.maximum(ratio * wheel, LAUNCH_RPM / RPM_PER_RADPS if way == 0 else 0.0)
+        full = tabulated(limits.full_nm, limits.engine_step, side)
+        machine_speed = ways.wheel[way, 1] * wheel + ways.side[way, 1] * side
+        machine = np.zeros_like(speed)
+        if len(limits.load_nm):
+            machine = tabulated(limits.load_nm[0], limits.engine_step, machine_speed)
+        elif boosts:
+            machine = tabulated(limits.high_nm, limits.machine_step, machine_speed)
+        on_side = full + ways.side[way, 1] * machine
+        torque = ratio * ways.wheel_yield[way, 0, -1] * on_side
+        torque += ways.wheel[way, 1] * ways.wheel_yield[way, 0, 1] * machine
+        known = (side >= limits.idle_radps) & (side <= limits.engine_max_radps)
+        forces.append(np.where(known, torque / radius, np.nan))
+    powers = speed ** np.arange(4)[:, None]
+    resistance = (np.array(driven.body.rolling_n) + np.array(driven.body.air_n)) @ powers
+    tyre = driven.body.tyre
+    grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
+    return Curves(speed, np.array(forces), resistance, float(grip))
+
+
+def tabulated(values: Array, step: float, speed: float | Array) -> Array:
+    """A torque that is tabulated over even steps of speed, rad/s."""
+    return np.asarray(np.interp(speed, step * np.arange(len(values)), values))
+
+
+def top_mps(curves: Curves, gear: int) -> float:
+    """Highest speed at which a gear's force still meets the resistance."""
+    enough = np.flatnonzero(curves.by_gear_n[gear] >= curves.resistance_n)
+    if not len(enough):
+        return 0.0
+    k = int(enough[-1])
+    if k + 1 == len(curves.speed_mps) or np.isnan(curves.by_gear_n[gear, k + 1]):
+        return float(curves.speed_mps[k])
+    over = curves.by_gear_n[gear, k : k + 2] - curves.resistance_n[k : k + 2]
+    return float(np.interp(0.0, over[::-1], curves.speed_mps[k : k + 2][::-1]))
+
+
+def slope_at(car: Architecture, curves: Curves, speed_mps: float, handling: Handling) -> float:
+    """Highest slope, rise over run, held at a speed: by force in the best gear, and by grip."""
+    at_speed = partial(np.interp, speed_mps, curves.speed_mps)
+    forces = [float(at_speed(force)) for force in curves.by_gear_n]
+    spare = max(filter(np.isfinite, forces), default=0.0) - float(at_speed(curves.resistance_n))
+    return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
+
+
+def start_slope(car: Architecture, driven: LoopCar, handling: Handling) -> float:
+    """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip."""
+    limits, ways = driven.limits, driven.ways
+    launch = LAUNCH_RPM / RPM_PER_RADPS
+    full = float(tabulated(limits.full_nm, limits.engine_step, launch))
+    passed = min(full, handling.clutch.slipping_nm)
+    force = ways.wheel[0, -1] * ways.wheel_yield[0, 0, -1] * passed / driven.body.radius_m
+    spare = force - driven.body.rolling_n[0]
+    return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
+
+
+def _tangent(sine: float, handling: Handling) -> float:
+    """Rise over run of a force over weight, no more than grip holds with the load that the slope moves."""
+    tyre = handling.tyre
+    grip = tyre.friction * tyre.driven_share / (1 + tyre.friction * tyre.height_share)
+    return float(min(np.tan(np.arcsin(min(max(sine, 0.0), 0.999999))), grip))
