@@ -56,8 +56,8 @@ def _proof_lines(found: Sizing) -> list[str]:
         f"{printable(key)} {low:g} to {high:g}" for key, (low, high) in ranges.items()
     )
     lines = [
-        f"no car of {listed}{' with ' + ', '.join(held) if held else ''} is below {least:.5g} "
-        f"({found.study.objectives[0].name}), whatever its strategy and requirements; the best is "
+        f"no car of {listed}{' with ' + ', '.join(held) if held else ''}{_within(found)} is below {least:.5g} "
+        f"({found.study.objectives[0].name}), whatever its strategy and requirements{_apart(found)}; the best is "
         f"{100 * (best.values[0] / least - 1):.2f} % above"
     ]
     for proof in found.proofs:
@@ -66,6 +66,16 @@ def _proof_lines(found: Sizing) -> list[str]:
             f"{100 * proof.gap:.2f} % above the bound, {proof.boxes} boxes in {proof.seconds:.1f} s"
         )
     return lines
+
+
+def _within(found: Sizing) -> str:
+    within = found.proofs[0].within
+    return f" that meets {' and '.join(map(printable, within))}" if within else ""
+
+
+def _apart(found: Sizing) -> str:
+    apart = found.proofs[0].apart
+    return f", and whether it meets {' and '.join(map(printable, apart))} or not" if apart else ""
 
 
 def as_dict(found: Sizing) -> dict[str, Any]:

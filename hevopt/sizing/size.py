@@ -14,7 +14,8 @@ from hevopt.errors import DataError, InfeasibleError
 from hevopt.files.shown import printable, shown
 from hevopt.sizing.candidates import Candidate, Candidates, Fate
 from hevopt.sizing.proof.modes import NotProvable
-from hevopt.sizing.proof.prove import SIZES, RangeProof, prove
+from hevopt.sizing.proof.prove import RangeProof, prove
+from hevopt.sizing.proof.space import SIZES
 from hevopt.sizing.search import is_lattice, search
 from hevopt.sizing.study_file import SizeStudy, read_size_study
 from hevopt.studies.provenance import files_digests
@@ -166,8 +167,10 @@ def _proofs(found: Sizing, best: Candidate) -> tuple[RangeProof, ...]:
     if not ranges:
         raise NotProvable("no proof over ranges: no size of engine, machine or battery has a range")
     fixed = {key: value for key, value in best.design.changes.items() if key not in ranges}
+    texts = [constraint.text for constraint in sweep.constraints]
     return tuple(
-        prove(sweep.architecture, ranges, load_cycle(cycle), fixed=fixed) for cycle in sweep.cycles
+        prove(sweep.architecture, ranges, load_cycle(cycle), fixed=fixed, constraints=texts)
+        for cycle in sweep.cycles
     )
 
 

@@ -18,7 +18,8 @@ from hevopt.sizing.proof.entries import (
     prices_of,
 )
 from hevopt.sizing.proof.modes import NotProvable
-from hevopt.sizing.proof.prove import Space, _Proof, prove
+from hevopt.sizing.proof.prove import _Proof, prove
+from hevopt.sizing.proof.space import Space
 from hevopt.studies.case import dp_case
 
 RANGES = {
@@ -26,21 +27,11 @@ RANGES = {
     "machine.scale.power": (0.6, 1.6),
     "battery.cells_in_series": (40, 120),
 }
-END = 196
 
 
 @pytest.fixture(scope="module")
-def cycle(tmp_path_factory):
-    """The first urban part of the NEDC, its gears listed."""
-    lines = load_cycle("nedc")
-    path = tmp_path_factory.mktemp("cycle") / "urban.csv"
-    rows = ["time_s,speed_kmh,gear,clutch_open"]
-    for k in range(END):
-        rows.append(
-            f"{lines.time_s[k]:g},{3.6 * lines.speed_mps[k]:.9f},{lines.gear[k]},{int(lines.clutch_open[k])}"
-        )
-    path.write_text("\n".join(rows) + "\n")
-    return load_cycle(path)
+def cycle(urban):
+    return urban
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +155,7 @@ def test_torque_that_is_needed_is_convex_in_the_sizes(proof, box):
             assert (needed_of(proof.laws, mode, middle) @ middle <= chord + 1e-9).all()
     fuel = Fuel(proof.laws, proof.laws.modes[0])
     torques = np.linspace(-30, 280, 60)
-    burnt = np.array([fuel.at(np.full(END - 1, torque))[0] for torque in torques])
+    burnt = np.array([fuel.at(np.full(len(proof.laws.step_s), torque))[0] for torque in torques])
     assert (np.diff(burnt, 2, axis=0) >= -1e-15).all() and (np.diff(burnt, axis=0) >= 0).all()
 
 

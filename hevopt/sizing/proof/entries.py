@@ -15,7 +15,7 @@ convex in theta; leaving one out, or letting the brakes work where the car drive
 Sizes are (engine, machine, battery). A plane is (time, 4): a constant and the slope by each.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import pi
 
 import numpy as np
@@ -25,6 +25,7 @@ from hevopt.car.engine_laws import CompactLaw
 from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Flags
 from hevopt.sizing.proof.laws import Laws
+from hevopt.sizing.proof.limits import vertices
 from hevopt.sizing.proof.modes import Mode, NotProvable
 
 ENGINE, MACHINE, BATTERY = 1, 2, 3
@@ -142,14 +143,20 @@ class Fuel:
 
 @dataclass(slots=True, eq=False, repr=False)
 class Box(Shown):
-    """A box of sizes. low, high: (3,) factors"""
+    """A box of sizes within linear limits. low, high: (3,) factors; rows: (limit, 4), see `limits`"""
 
     low: Array
     high: Array
+    rows: Array = field(default_factory=lambda: np.zeros((0, 4)))
 
     @property
     def corners(self) -> Array:
-        """(corner, 4) all corners with a 1 in front; sizes that do not vary have one value."""
+        """(corner, 4) all corners with a 1 in front; sizes that do not vary have one value.
+
+        Within limits the vertices of what they leave, none where that is nothing.
+        """
+        if len(self.rows):
+            return vertices(self.low, self.high, self.rows)
         found = np.ones((1, 1))
         for low, high in zip(self.low, self.high, strict=True):
             ends = [low] if low == high else [low, high]
@@ -158,7 +165,9 @@ class Box(Shown):
 
     @property
     def middle(self) -> Array:
-        """(3,) its centre."""
+        """(3,) its centre, or within limits the mean of its vertices."""
+        if len(self.rows) and len(self.corners):
+            return np.asarray(self.corners[:, 1:].mean(axis=0))
         return (self.low + self.high) / 2
 
 

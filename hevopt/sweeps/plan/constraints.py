@@ -125,7 +125,7 @@ def _parsed(text: str, kinds: Mapping[str, Kind], what: str) -> tuple[Kind, froz
         raise DataError(
             f"{_quoted(text, what)} has {len(text)} characters; allowed: up to {_CHARACTERS_MAX}; split it"
         )
-    tree, names = _tree(text, what)
+    tree, names = parsed_tree(text, what)
     if _depth(tree) > _DEPTH_MAX:
         raise DataError(
             f"{_quoted(text, what)} is nested deeper than {_DEPTH_MAX} levels; split it"
@@ -158,7 +158,7 @@ def _reason(error: Exception) -> str:
     return "out of range" if isinstance(error, OverflowError) else "not a real number"
 
 
-def _tree(text: str, what: str) -> tuple[ast.expr, dict[str, str]]:
+def parsed_tree(text: str, what: str) -> tuple[ast.expr, dict[str, str]]:
     """The syntax tree with a placeholder for each parameter, and placeholder -> parameter."""
     names: dict[str, str] = {}
 
