@@ -5,6 +5,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -13,6 +14,8 @@ from typing import Any, TypeVar
 from hevopt.errors import HevoptError
 
 _Result = TypeVar("_Result")
+# How often the process that was forked looks whether the first is still there.
+_LOOK_S = 0.2
 
 
 class SharedCount:
@@ -57,7 +60,9 @@ def halves(work: Callable[[int], _Result], count: int, tally: SharedCount) -> li
     os.close(issued)
     context = get_context("fork")
     here, there = context.Pipe(duplex=False)
-    other = context.Process(target=_other, args=(work, tickets, tally, there), daemon=True)
+    other = context.Process(
+        target=_other, args=(work, tickets, tally, there, os.getpid()), daemon=True
+    )
     other.start()
     there.close()
     try:
@@ -81,12 +86,22 @@ def halves(work: Callable[[int], _Result], count: int, tally: SharedCount) -> li
     return results
 
 
-def _other(work: Callable[[int], Any], tickets: int, tally: SharedCount, there: Connection) -> None:
-    # The first process is interrupted, and ends this one.
+def _other(
+    work: Callable[[int], Any], tickets: int, tally: SharedCount, there: Connection, first: int
+) -> None:
+    # The first process is interrupted, and ends this one; where it is killed, nobody does.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with, args=(first,), daemon=True).start()
     tally.in_other_process()
     there.send(_taken(work, tickets))
+
+
+def _end_with(first: int) -> None:
+    """End this process once the first one is gone: nobody would read what it sends, nor close what it holds."""
+    while os.getppid() == first:
+        time.sleep(_LOOK_S)
+    os._exit(1)
 
 
 def _taken(work: Callable[[int], Any], tickets: int) -> dict[int, Any]:

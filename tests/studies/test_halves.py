@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import asdict
@@ -74,6 +76,31 @@ def test_interrupt_leaves_no_process_behind() -> None:
     with pytest.raises(KeyboardInterrupt):
         halves(work, 4, SharedCount())
     assert not multiprocessing.active_children()
+
+
+_KILLED = """
+import os, signal, sys, time
+from hevopt.studies.halves import SharedCount, halves
+own = os.getpid()
+def work(n):
+    if os.getpid() == own:
+        time.sleep(0.3)
+        os.kill(own, int(sys.argv[1]))
+    time.sleep(float(sys.argv[2]))
+    return b"more than a pipe holds" * 10_000
+halves(work, 3, SharedCount())
+"""
+
+
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("busy_s", [0.01, 60], ids=["that sends", "at work"])
+def test_process_does_not_outlive_the_first_one(by: signal.Signals, busy_s: float) -> None:
+    asked = [sys.executable, "-c", _KILLED, str(int(by)), str(busy_s)]
+
+    # Both hold the pipe: it is at its end when both are gone.
+    ended = subprocess.run(asked, stdout=subprocess.PIPE, timeout=30, check=False)
+
+    assert ended.returncode == -by
 
 
 def test_comparison_by_two_processes_is_that_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
