@@ -7,6 +7,7 @@ or off, gears beside the listed one, and while the engine drives the machine's t
 rest. Gears and clutch are the driver's, as in a replayed plan.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -146,12 +147,13 @@ def follow_asked(
     work, loop = col.work_of(driven.ways), col.begun(driven, task, float(planned.energy_j[0]))
     breathing = breathing_of(car, engine_model, start_radps(car, line, cycle, task))
     advance = col.advance if breathing is None else breathing.advance
+    way = cache(line.index)
     for d, at_s in enumerate(from_s[:-1].tolist()):
         # A step of the driven car may begin a little before the cycle's.
         k = int(step[d]) if decider.points is not None else min(d, len(gears) - 1)
         look = col.seen(driven, task, loop, at_s, decider.asking.interval_s, exact_s)
         command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
-        task.way[d] = line.index(command.listed or int(gears[k]), command.gears)
+        task.way[d] = way(command.listed or int(gears[k]), command.gears)
         task.engine_on[d], task.machine_nm[d] = command.engine_on, command.machine_nm
         if d == 0:
             loop = col.begun(driven, task, loop.energy_j)

@@ -38,7 +38,10 @@ def solved(urban):
     return car, problem, points_of(car, problem, levels=11), simulate(problem, plan.control)
 
 
-@pytest.mark.parametrize("strategy", ["conventional", "nox_cut", "a_ecms", "mpc"])
+@pytest.mark.parametrize(
+    "strategy",
+    ["conventional", "nox_cut", "a_ecms", "mpc", pytest.param("sdp", marks=pytest.mark.long)],
+)
 def test_a_strategy_that_decides_on_the_way_drives_like_its_backward_twin(urban, strategy):
     found = drive(load_architecture("C2"), urban, strategy, step_s=0.05)
     run = found.run

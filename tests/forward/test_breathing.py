@@ -121,7 +121,8 @@ def test_the_turbochargers_lag_costs_time_from_rest_and_in_gear():
     by_map, lagging = performance(car), performance(car, engine_model="mean_value")
     assert by_map.to_speed_s[100] < lagging.to_speed_s[100] < by_map.to_speed_s[100] + 2.0
     for case, time in lagging.in_gear_s.items():
-        assert by_map.in_gear_s[case] is None or time > by_map.in_gear_s[case] - 0.1
+        # Settled, its torque may be 4 % above the file's curve.
+        assert by_map.in_gear_s[case] is None or time > 0.96 * by_map.in_gear_s[case]
 
 
 @pytest.mark.parametrize(
