@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hevopt import load_architecture
+from hevopt import load_architecture, simulate, solve
 from hevopt.driving.cycle import load_cycle
 from hevopt.driving.demand import demand_of
 from hevopt.powertrain.branches import branches
@@ -176,3 +176,21 @@ def test_what_cannot_be_proven_is_said(car, ranges, words):
 def test_a_cycle_without_gears_is_said(cycle):
     with pytest.raises(NotProvable, match="without listed gears"):
         prove("C2", RANGES, load_cycle("hwfet"))
+
+
+@pytest.mark.long
+def test_of_a_thousand_random_designs_inside_none_lies_below(cycle):
+    found = prove("C2", RANGES, cycle)
+    assert found.closed and found.seconds < 60
+    space, rng, near = Space("C2", RANGES, {}), np.random.default_rng(8), 0
+    for theta in space.low + (space.high - space.low) * rng.random((1000, 3)):
+        problem = build_problem(space.car(theta), cycle)
+        for name in ("ecms", "dp"):  # dynamic programming where ecms comes near
+            plan = simulate(problem, solve(problem, name).control)
+            litres = plan.cost_kg / 0.835 / cycle.distance_m * 1e5
+            assert litres >= found.bound_l_per_100km, (theta, name)
+            if litres > 1.01 * found.bound_l_per_100km:
+                break
+        else:
+            near += 1
+    assert near > 0  # the bound is no idle one: some designs lie within 1 % of it
