@@ -17,6 +17,7 @@ from hevopt.commands import (
     listing,
     mapping,
     reporting,
+    scores,
     sizing,
     solving,
     studies,
@@ -69,6 +70,7 @@ for command in (
     studies.reproduction,
     studies.turbo_lag,
     validation.validation,
+    scores.scores,
     turbo.tipin,
 ):
     app.command(cls=GroupedOptions)(command)
