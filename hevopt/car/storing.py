@@ -8,7 +8,6 @@ generator alone, both count together, at the best point of the two; else the mac
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.car.engine import Engine
 from hevopt.car.machine import Machine
 
 _MACHINE_EFFICIENCY = 0.94
@@ -23,20 +22,26 @@ def storing_kgpj(car: Architecture) -> float | None:
     placed = zip(line.machines, car.machines, strict=True)
     generators = [machine for (_, shaft), machine in placed if shaft == line.engine]
     if generators and not line.engine_reaches_wheels:
-        efficiency = max(_generating(engine, machine) for machine in generators)
+        efficiency = max(_generating(car, machine) for machine in generators)
     else:
-        efficiency = engine.best_efficiency * _MACHINE_EFFICIENCY
+        efficiency = _usual(car)
     return 1.0 / (engine.heating_value_jpkg * efficiency)
 
 
-def _generating(engine: Engine, machine: Machine) -> float:
-    """The highest efficiency from fuel to the terminals of a machine on the engine's shaft, from a grid."""
+def _usual(car: Architecture) -> float:
+    converted = 1.0 if car.converter is None else float(car.converter.efficiency.max())
+    return car.engine.best_efficiency * _MACHINE_EFFICIENCY * converted
+
+
+def _generating(car: Architecture, machine: Machine) -> float:
+    """The highest efficiency from fuel to the battery by way of a machine on the engine's shaft, from a grid."""
+    engine = car.engine
     highest = min(engine.speed_max_radps, machine.speed_max_radps)
     speed = np.linspace(engine.full_load_speed_radps[0], highest, _SPEEDS)[:, None]
     torque = engine.full_load_nm(speed) * np.linspace(1 / _TORQUES, 1.0, _TORQUES)
     fuel_w = engine.heating_value_jpkg * engine.fuel_kgps(torque, speed)
-    made_w = torque * speed - machine.loss_w(-torque, speed)
+    made_w = -car.terminal_w(machine.loss_w(-torque, speed) - torque * speed)
     known = (fuel_w > 0) & (made_w > 0) & (torque <= machine.limit_nm(speed))
     shares = np.where(known, made_w, 0.0) / np.where(known, fuel_w, 1.0)
     # Where the generator is too small for any of these points, the engine's best, as of other cars.
-    return float(shares.max()) or engine.best_efficiency * _MACHINE_EFFICIENCY
+    return float(shares.max()) or _usual(car)

@@ -91,7 +91,7 @@ class HybridEnv(gymnasium.Env):  # type: ignore[misc]
         self._number = int(number)
         problem = self._problems[self._number]
         if "soc_start" in options:
-            problem = replace(problem, soc_start=float(options["soc_start"]))
+            problem = replace(problem, soc_start=_number(options["soc_start"]))
         self.problem, self._steps = problem, Steps(problem)
         self._control, self._cost_kg = [], 0.0
         self._at(0, problem.start_j, problem.start_mode)
@@ -180,6 +180,15 @@ class HybridEnv(gymnasium.Env):  # type: ignore[misc]
         switch_kg = len(usable) * float(problem.table.switch_fuel_kg.max())
         missing_j = problem.end_min_j - problem.window_j[0]
         return dearest_kg + switch_kg + price * self._short * missing_j - self._cost_kg
+
+
+def _number(soc_start: Any) -> float:
+    try:
+        return float(soc_start)
+    except (TypeError, ValueError):
+        raise DataError(
+            f"reset: soc_start = {soc_start!r}; allowed: a state of charge, 0 to 1"
+        ) from None
 
 
 def _standing(now: Step) -> Step:

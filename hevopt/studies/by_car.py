@@ -69,10 +69,12 @@ class Solving:
     tally: SharedCount = field(default_factory=SharedCount)
 
     def found(self, may_fork: bool) -> list[OfCar]:
-        """Every car's; may_fork: by two processes where memory lasts for two and nobody observes."""
+        """Every car's; may_fork: by two processes where memory lasts for two, nobody observes, and no strategy from
+        outside is asked, which may remember from one car to the next."""
         cars = range(len(self.asked))
         short = len(self.cycle.time_s) <= _FORK_SAMPLES_MAX and 1 < len(cars) <= _FORK_CARS_MAX
-        if may_fork and short and self.watch.observe is unobserved and two_processors():
+        alone = self.others or self.watch.observe is not unobserved
+        if may_fork and short and not alone and two_processors():
             return halves(self._of_car, len(cars), self.tally)
         return [self._of_car(n) for n in cars]
 

@@ -159,6 +159,8 @@ def test_the_seed_draws_among_problems_and_options_name_one(problem):
         ({"problem": 2}, "0 to 1"),
         ({"soc": 0.5}, "allowed: problem, soc_start"),
         ({"soc_start": 1.5}, "SOC window"),
+        ({"soc_start": "full"}, "soc_start = 'full'"),
+        ({"soc_start": None}, "soc_start = None"),
     ):
         with pytest.raises(DataError, match=words):
             env.reset(options=options)

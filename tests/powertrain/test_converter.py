@@ -5,6 +5,7 @@ import pytest
 from split_cars import short
 
 from hevopt import DataError, build_problem, certify, load_architecture, simulate
+from hevopt.car.storing import storing_kgpj
 from hevopt.forward.lines import line_of
 from hevopt.strategies import dp
 
@@ -56,6 +57,12 @@ def test_a_converter_of_no_loss_changes_nothing():
     plain = build_problem(load_architecture("C2"), cycle, levels=5)
     ideal = build_problem(with_converter("C2", {"efficiency": 1.0}), cycle, levels=5)
     np.testing.assert_array_equal(plain.table.battery_power_w, ideal.table.battery_power_w)
+
+
+@pytest.mark.parametrize("car", ["series_1500", "prius_1998"])
+def test_storing_a_joule_takes_what_the_converter_loses_as_well(car):
+    behind = with_converter(car, {"efficiency": 0.8})
+    assert 0.8 * storing_kgpj(behind) == pytest.approx(storing_kgpj(load_architecture(car)))
 
 
 def test_a_car_driven_forward_has_none():

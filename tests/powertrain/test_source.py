@@ -5,6 +5,7 @@ import pytest
 from split_cars import short
 
 from hevopt import DataError, build_problem, certify, load_architecture, simulate
+from hevopt.car_files.template import new_files
 from hevopt.checks.validate import validate
 from hevopt.files.lookup import shipped_folder
 from hevopt.strategies import dp, fitting, thermostat
@@ -111,3 +112,12 @@ def test_a_source_drives_no_shaft(tmp_path):
     path.write_text(path.read_text().replace('kind = "series"', kind))
     with pytest.raises(DataError, match="a source gives electricity alone"):
         load_architecture(path)
+
+
+def test_a_car_with_a_source_is_not_written_out_as_parts(tmp_path):
+    path = written(tmp_path)
+    with pytest.raises(DataError, match="leave --parts out"):
+        new_files("copy", path, tmp_path / "copy.toml", parts=True)
+    for file, text in new_files("copy", path, tmp_path / "copy.toml", ["source"]).items():
+        file.write_text(text)
+    assert load_architecture(tmp_path / "copy.toml").engine.name == "fuel cell 45 kW"

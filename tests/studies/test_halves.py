@@ -9,13 +9,18 @@ import threading
 import time
 from dataclasses import asdict
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
+from split_cars import short
 
 from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError, InfeasibleError
+from hevopt.problem.problem import Problem
+from hevopt.strategies import chosen
 from hevopt.studies.by_car import Watch
 from hevopt.studies.cars import cars_of
-from hevopt.studies.comparison import compare_cars
+from hevopt.studies.comparison import compare_cars, solve
 from hevopt.studies.halves import SharedCount, halves, two_processors
 from hevopt.studies.settings import Settings
 
@@ -118,6 +123,24 @@ def test_comparison_by_two_processes_is_that_of_one(monkeypatch: pytest.MonkeyPa
     assert forked.reference == alone.reference
     assert forked.failures.keys() == alone.failures.keys()
     assert all(0 <= done < total for done, total in told)
+
+
+def test_strategies_from_outside_are_asked_by_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One may remember from car to car, and would depend on who took which."""
+    asked: list[int] = []
+
+    def counting(problem: Problem) -> NDArray[np.int64]:
+        asked.append(os.getpid())
+        return solve(problem, "start_stop").control
+
+    names, others = chosen({"counting": counting})
+    settings = Settings(strategies=names)
+    monkeypatch.setattr("hevopt.studies.by_car.two_processors", lambda: True)
+
+    cars = cars_of(("A", "B", "C1"), settings).cars
+    found = compare_cars(cars, short("udds", 60), settings, others=others, may_fork=True)
+
+    assert asked == [os.getpid()] * 3 and all(row.solved for row in found.rows)
 
 
 def test_a_process_with_threads_is_not_forked() -> None:
