@@ -50,6 +50,7 @@ GROUPS: Sequence[HelpGroup] = (
             "reproduction": "hevopt reproduction --out reproduction.md",
             "turbo-lag": "hevopt turbo-lag --out turbo_lag.md",
             "validation": "hevopt validation --out validation.md",
+            "scores": "hevopt scores --out scores.md",
         },
     ),
     HelpGroup(
