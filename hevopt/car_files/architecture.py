@@ -23,9 +23,6 @@ from hevopt.car_files.fields import (
 from hevopt.car_files.handling import ClutchFile, DriverFile, ShiftingFile, TyreFile
 from hevopt.files.toml import FileModel
 
-# Points between which efficiency of a converter is looked at.
-_FINE = 2001
-
 
 def _names_a_file(table: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(table.get("file"), str):
@@ -61,11 +58,12 @@ class ConverterFile(FileModel):
             )
         if (np.diff(power) <= 0).any():
             raise ValueError("power_w must increase")
-        fine = np.unique(np.append(np.linspace(0.0, power[-1], _FINE), power))
-        of_fine = np.interp(fine, power, share)
-        for passing in (fine / of_fine, fine * of_fine):
-            if (np.diff(passing) <= 0).any():
-                near = fine[int(np.argmin(np.diff(passing)))]
+        # P / share rises where share > P slope, P share where share > -P slope: both linear between two points.
+        slope = np.diff(share) / np.diff(power)
+        for at in (slice(None, -1), slice(1, None)):
+            falls = np.abs(power[at] * slope) >= share[at]
+            if falls.any():
+                near = power[at][int(np.argmax(falls))]
                 raise ValueError(
                     f"efficiency changes so fast near {near:g} W that more power at the bus is less at the battery"
                 )

@@ -78,6 +78,10 @@ def test_a_car_driven_forward_has_none():
         ({"efficiency": 0.9, "power_w": [0, 1]}, "one efficiency needs no power_w"),
         ({"efficiency": [0.9, 0.95], "power_w": [5, 5]}, "power_w must increase"),
         ({"efficiency": [0.2, 0.9], "power_w": [1000, 1100]}, "more power at the bus is less"),
+        (
+            {"efficiency": [0.9, 0.9, 0.5, 0.5], "power_w": [0, 1000, 2000, 1e9]},
+            "near 2000 W .* more power at the bus is less",
+        ),
         ({"efficiency": [0.9, float("nan")], "power_w": [0, 1]}, "efficiency"),
     ],
 )
