@@ -8,6 +8,7 @@ from statistics import median
 
 import pytest
 
+from hevopt.car_files.load import load_architecture
 from hevopt.cli import main
 from hevopt.errors import DataError
 from hevopt.pages.validation import validation_page
@@ -17,6 +18,7 @@ from hevopt.reproduction.validation.laboratory import (
     Laboratory,
     LabTest,
     about,
+    changed,
     every_test,
     laboratories,
 )
@@ -88,6 +90,38 @@ def test_the_electric_load_costs_what_an_alternator_and_an_engine_make_of_it():
     assert one.load_l_per_100km == pytest.approx(litres, rel=0.1)
 
 
+def test_what_the_engine_would_have_to_do_is_told_from_what_it_does():
+    for one in held():
+        use, warm = one.engine, one.laboratory.warm_l_per_100km
+        litres = use.work_mjpkm / use.efficiency / 42.6 / 0.749 * 100
+        assert litres == pytest.approx(fuel(one.causal), rel=0.01)
+        assert one.needed_efficiency == pytest.approx(use.efficiency * fuel(one.causal) / warm)
+        # The Camry burns less than its model, and no less than the best point of its map would have it.
+        assert use.efficiency < one.needed_efficiency < use.best_efficiency
+        assert pages.carrier(one) == "engine's map"
+
+
+@pytest.mark.parametrize("car", sorted(changed()))
+def test_what_was_changed_after_results_were_seen_is_a_key_of_the_file_and_another_value(car):
+    change = changed()[car]
+    assert change.values and len(change.said) > 20
+    now = load_architecture(car)
+    before = load_architecture(now.source, change.values)
+    for key, value in change.values.items():
+        old, new = before.contents, now.contents
+        for part in key.split("."):
+            old, new = old[part], new[part]
+        assert old == value != new
+
+
+def test_what_a_change_moved_is_worked_out():
+    """Gears of 0.92 in place of 0.95 take 0.95 / 0.92 - 1 = 3.3 % more work, and less than that in fuel."""
+    for one in held():
+        assert 1.005 < one.before.causal_l_per_100km / fuel(one.causal) < 0.95 / 0.92
+    section = pages.page(held()).split("## Changed after")[1].split("\n## ")[0]
+    assert f"{held()[0].before.causal_l_per_100km:.3f}" in section and "0.92" in section
+
+
 def test_the_committed_page_is_that_of_this_model():
     """A few rows of it, worked out afresh; the whole is made in the long test."""
     rows = {(row[0], row[1]): row for row in table("Fuel, the worst first")}
@@ -142,7 +176,7 @@ def test_the_command_writes_the_page(name, monkeypatch, tmp_path, capsys):
     assert shown in text and "--cars camry_2018" in text
     if name.endswith("html"):
         assert text == validation_page(held(), pages.page(held(), " ".join([*words, str(out)])))
-        assert text.count("<table>") == 5 and "at-a-glance" in text and "| ---" not in text
+        assert text.count("<table>") == 7 and "at-a-glance" in text and "| ---" not in text
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ is charge-corrected; the bound is that of plans which end with the charge of the
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +15,14 @@ from hevopt.car_files.load import load_architecture
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle, load_cycle
 from hevopt.driving.demand import demand_of
+from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.arrays import Array
-from hevopt.reproduction.validation.laboratory import Laboratory, about, laboratories
+from hevopt.problem.problem import Trajectory
+from hevopt.problem.simulation import simulate
+from hevopt.reproduction.validation.laboratory import Laboratory, about, changed, laboratories
+from hevopt.strategies import strategy_named
 from hevopt.studies.case import Case, litres, prepare
-from hevopt.studies.rows import Row, shortfall_steps
+from hevopt.studies.rows import Row, row_of, shortfall_steps
 from hevopt.studies.settings import Settings
 from hevopt.studies.solved import run_case
 
@@ -25,6 +30,21 @@ from hevopt.studies.solved import run_case
 _PLAIN = ("baseline", "baseline")
 _HYBRID = ("conventional", "a_ecms")
 _LOAD_KEY = "car.auxiliary_power_w"
+
+
+class EngineUse(NamedTuple):
+    """An engine on a drive: work, MJ/km, efficiency with starts and changes of gear, and the highest of its map."""
+
+    work_mjpkm: float
+    efficiency: float
+    best_efficiency: float
+
+
+class Before(NamedTuple):
+    """A car's file as it was when first results were seen: what was changed since, and the fuel, l/100 km."""
+
+    change: str
+    causal_l_per_100km: float
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -35,6 +55,7 @@ class Held(Shown):
     load: what the bound rises by with the electric load of the other published model
     work_mjpkm, road_mjpkm: positive work at the wheels, of the model and by an integral of its own
     shortfall_steps: steps that the car cannot follow
+    engine: of the best causal strategy; before: what it burnt before the file was changed, None where it was not
     """
 
     laboratory: Laboratory
@@ -50,6 +71,8 @@ class Held(Shown):
     road_mjpkm: float
     steps: int
     shortfall_steps: int
+    engine: EngineUse
+    before: Before | None
 
     def _facts(self) -> dict[str, object]:
         return {"car": self.laboratory.car, "cycle": self.laboratory.cycle,
@@ -65,6 +88,12 @@ class Held(Shown):
         """The best causal strategy against the warm car; None where no warm figure is known."""
         warm = self.laboratory.warm_l_per_100km
         return None if warm is None else 100 * (self.causal_l_per_100km / warm - 1)
+
+    @property
+    def needed_efficiency(self) -> float | None:
+        """Of the engine, to do the causal strategy's work with the warm car's fuel; None where not known."""
+        warm = self.laboratory.warm_l_per_100km
+        return None if warm is None else self.engine.efficiency * self.causal_l_per_100km / warm
 
 
 def fuel(row: Row) -> float:
@@ -92,7 +121,8 @@ def _held(laboratory: Laboratory) -> Held:
     case = prepare(car, cycle, Settings(allow_shortfall=True))
     rule, causal = _HYBRID if "power_management" in car.functions else _PLAIN
     names = dict.fromkeys((rule, causal, "dp"))
-    rows = {name: run_case(case, name)[0] for name in names}
+    runs = {name: run_case(case, name) for name in names}
+    rows = {name: run[0] for name, run in runs.items()}
     # Without a stop of the engine there is nothing to decide but the gear, as dp does.
     rows["ecms"] = run_case(case, "ecms")[0] if "start_stop" in car.functions else rows["dp"]
     bound_kg, proof = case.certificate.bound_kg(case.problem.end_min_j)
@@ -111,7 +141,32 @@ def _held(laboratory: Laboratory) -> Held:
         road_work_jpm(car, cycle) / 1e3,
         len(case.problem.table.time_s),
         shortfall_steps(case.problem),
+        _engine_use(case, runs[causal][2]),
+        _before(case, causal),
     )
+
+
+def _engine_use(case: Case, trajectory: Trajectory) -> EngineUse:
+    flows, step, engine = trajectory.flows, case.problem.table.step_s, case.car.engine
+    shaft_w = flows["engine_torque_nm"] * flows["engine_speed_radps"]
+    burns = flows["fuel_power_w"] > 0
+    work_j = float(np.sum(np.where(burns, shaft_w, 0.0) * step))
+    fuel_j = trajectory.total_fuel_kg * engine.heating_value_jpkg
+    return EngineUse(work_j / case.cycle.distance_m / 1e3, work_j / fuel_j, engine.best_efficiency)
+
+
+def _before(case: Case, causal: str) -> Before | None:
+    """The causal strategy in the car as its file was; charge is worth what it is worth in the car as it is."""
+    change = changed().get(case.car.name)
+    if change is None:
+        return None
+    car = load_architecture(case.car.source, change.values)
+    problem = build_problem(car, case.cycle, allow_shortfall=True)
+    plan = strategy_named(causal).solve(problem)
+    row = row_of(
+        replace(case, car=car, problem=problem), causal, simulate(problem, plan.control), 0.0
+    )
+    return Before(change.said, fuel(row))
 
 
 def _load(case: Case, bound_kg: float, other_w: float) -> float:

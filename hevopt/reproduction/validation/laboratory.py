@@ -48,6 +48,13 @@ class About(NamedTuple):
     faults: str
 
 
+class Changed(NamedTuple):
+    """What of a car's file was changed after the first results were seen: keys with the values before, and why."""
+
+    values: dict[str, float]
+    said: str
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Laboratory(Shown):
     """All tests of one car on one cycle; figures are their means, l/100 km."""
@@ -112,6 +119,18 @@ def about() -> dict[str, About]:
     }
 
 
+@cache
+def changed() -> dict[str, Changed]:
+    """Car -> what of its file was changed after the first results were seen."""
+    return {
+        row["car"]: Changed(
+            {key: float(row[f"value_{n}"]) for n in (1, 2) if (key := row[f"key_{n}"])},
+            row["change"],
+        )
+        for row in _rows("changed.csv")
+    }
+
+
 def laboratories(
     cars: Sequence[str] | None = None, cycles: Sequence[str] | None = None
 ) -> list[Laboratory]:
@@ -147,7 +166,7 @@ def laboratories(
 
 def measured_files() -> list[Path]:
     """The files that the tests come from."""
-    return [_folder() / "measured.csv", _folder() / "about.csv"]
+    return [_folder() / name for name in ("measured.csv", "about.csv", "changed.csv")]
 
 
 def _folder() -> Path:

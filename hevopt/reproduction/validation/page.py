@@ -24,6 +24,8 @@ def page(held: Sequence[Held], command: str = COMMAND) -> str:
         _fuel(ordered),
         _split(ordered),
         _explained(ordered),
+        _carried(ordered),
+        _changed(ordered),
         _work(ordered),
         _tests(ordered),
     ]
@@ -153,6 +155,72 @@ def _explained(held: Sequence[Held]) -> str:
 public here. The one that stands for it, scaled by displacement, has the peak efficiency that their makers
 state, but away from the peak that of an engine of 2000."""
     return f"## Car by car\n\n{text}\n\n" + markdown(heads, "lllll", rows)
+
+
+def _carried(held: Sequence[Held]) -> str:
+    rows = []
+    for h in held:
+        needed, off = h.needed_efficiency, h.off_percent
+        if needed is None or off is None:
+            continue
+        use = h.engine
+        cells = [
+            f"{use.work_mjpkm:.3f}",
+            *(f"{100 * x:.1f}" for x in (use.efficiency, needed, use.best_efficiency)),
+        ]
+        rows.append([f"`{h.laboratory.car}`", h.laboratory.cycle, signed(off), *cells, carrier(h)])
+    heads = ["car", "cycle", "causal against warm, %", "engine's work, MJ/km", "efficiency, %", "needed, %",
+             "best of the map, %", "what carries the difference"]  # fmt: skip
+    text = f"""Work and efficiency of the engine under the best causal strategy, and the efficiency that would do
+this work with the fuel of the warm car. *Engine's map*: the car burnt less than the model, and an efficiency
+below the map's own best would do: the engine is better away from its best point than the map that stands for
+it. *Work*: not even the best point would do, so that the engine has too much to do. *Losses left out*: the car
+burnt more. Within {WANTED_PERCENT:g} % nothing is said."""
+    return f"## What carries the difference\n\n{text}\n\n" + markdown(heads, "llrrrrrl", rows)
+
+
+def carrier(held: Held) -> str:
+    """What carries the difference of a car and cycle whose warm fuel is known, from the engine's efficiencies."""
+    off, needed = held.off_percent, held.needed_efficiency
+    assert off is not None and needed is not None
+    if abs(off) <= WANTED_PERCENT:
+        return "-"
+    if off < 0:
+        return "losses left out"
+    return "engine's map" if needed <= held.engine.best_efficiency else "work"
+
+
+def _changed(held: Sequence[Held]) -> str:
+    rows, said = [], {}
+    for h in held:
+        warm = h.laboratory.warm_l_per_100km
+        if h.before is None or warm is None:
+            continue
+        said[h.laboratory.car] = h.before.change
+        before = h.before.causal_l_per_100km
+        cells = [
+            f"{before:.3f}",
+            f"{h.causal_l_per_100km:.3f}",
+            signed(100 * (before / warm - 1)),
+            signed(h.off_percent or 0.0),
+        ]
+        rows.append([f"`{h.laboratory.car}`", h.laboratory.cycle, *cells])
+    heads = [
+        "car",
+        "cycle",
+        "causal before, l/100 km",
+        "causal",
+        "against warm before, %",
+        "against warm, %",
+    ]
+    text = """Figures of the cars' files that were changed after the first results had been seen, each for the
+reason said, and to a value that was not chosen by the result; what they moved:"""
+    if not rows:
+        return "## Changed after results were seen\n\nNothing, of these cars."
+    listed = "\n".join(f"- `{car}`: {change}" for car, change in said.items())
+    return f"## Changed after results were seen\n\n{text}\n\n{listed}\n\n" + markdown(
+        heads, "llrrrr", rows
+    )
 
 
 def _work(held: Sequence[Held]) -> str:
