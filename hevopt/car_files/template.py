@@ -201,7 +201,7 @@ def _table_lines(
         path, inner = (*at, key), _inner_table(shape)
         allowed = file_schema.allowed(shape, tables)
         if at == () and model == "ArchitectureFile" and key in COMPONENTS:
-            allowed = f"shipped: {', '.join(_shipped_components(key))}"
+            allowed = f"shipped: {', '.join(_shipped_components(key)) or 'none'}"
         said = f"{meaning}{f' ({unit})' if unit.strip('-') else ''}; {allowed}"
         if key not in contents:
             default = f", by default {_toml(shape['default'])}" if "default" in shape else ""

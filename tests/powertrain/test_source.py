@@ -120,4 +120,5 @@ def test_a_car_with_a_source_is_not_written_out_as_parts(tmp_path):
         new_files("copy", path, tmp_path / "copy.toml", parts=True)
     for file, text in new_files("copy", path, tmp_path / "copy.toml", ["source"]).items():
         file.write_text(text)
+    assert "kind series; shipped: none" in (tmp_path / "copy.toml").read_text()
     assert load_architecture(tmp_path / "copy.toml").engine.name == "fuel cell 45 kW"
