@@ -242,7 +242,8 @@ def test_units_are_those_of_the_keys_suffixes():
         for key, (unit, _) in table.items():
             suffix = f"_{key.rpartition('_')[2]}" if "_" in key else ""
             if suffix in SUFFIX_UNITS:
-                assert unit == SUFFIX_UNITS[suffix], key
+                per = "1/" if key.endswith(f"_per{suffix}") else ""
+                assert unit == per + SUFFIX_UNITS[suffix], key
                 checked += 1
     assert checked > 40
 
