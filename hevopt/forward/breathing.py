@@ -11,6 +11,7 @@ from hevopt.forward import _breathing_kernels as col
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._drive_kernels import Loop, Work
 from hevopt.forward._pull_kernels import Foot, Pull, PullWork
+from hevopt.mean_value._run_kernels import TABLEAUX
 from hevopt.mean_value.car import BENCH, model_of
 from hevopt.mean_value.parameters import FULL_LOAD, Drive, curve_of
 from hevopt.mean_value.run import STEP_S
@@ -71,8 +72,6 @@ class Breathing:
 
     def _some(self, steps: int, step_s: float) -> tuple[col.Air, int, Array]:
         """How the next steps are marched, how many of them, and room for what they leave behind."""
-        from hevopt.mean_value._run_kernels import TABLEAUX
-
         if self._left == 0:
             self._left = max(round(_GUARD_EVERY_S / step_s), 1)
             longest = min(longest_step_s(0.0, self._gas, self._model), STEP_S)

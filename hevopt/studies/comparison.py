@@ -11,8 +11,6 @@ from hevopt.driving.cycle import DISTANCE_MIN_M, Cycle, load_cycle
 from hevopt.errors import (
     DataError,
     HevoptError,
-    InfeasibleError,
-    SolverError,
     UnknownNoxError,
 )
 from hevopt.files.keywords import check_keywords
@@ -35,8 +33,6 @@ from hevopt.studies.solved import (
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-_FAILURES = (InfeasibleError, SolverError, UnknownNoxError)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -155,7 +151,7 @@ def compare_cars(
 
     others: strategies beside those shipped and registered; forward: drive every row forward as well
     may_fork: share the cars with a process forked from this one, on drives short enough for the memory of two; cars
-    that are observed or driven forward are solved by one process
+    that are observed or driven forward, and strategies from outside, are solved by one process
     """
     driven: dict[tuple[str, str], ForwardFigures] = {}
     if forward:

@@ -1,6 +1,7 @@
 """The real cars in FASTSim: wheels step by step, its constants, the parts of its fuel, the page and its command."""
 
 import re
+import sys
 from functools import cache
 from math import cos, sin
 from pathlib import Path
@@ -19,12 +20,16 @@ PAGE = Path(__file__).parents[2] / "reports" / "cross_tool.md"
 SAME = 1e-5
 
 
-@cache
-def there():
-    """The two that need nothing compiled beyond a table; skipped where the tool is not installed."""
+def needs_fastsim():
     pytest.importorskip(
         "fastsim", reason='FASTSim is not installed: pip install "hevopt[cross-tool]"'
     )
+
+
+@cache
+def there():
+    """The two that need nothing compiled beyond a table; skipped where the tool is not installed."""
+    needs_fastsim()
     from hevopt.reproduction.cross_tool.held import hold_across
 
     return hold_across(["camry_2018"], ["hwfet", "us06"])
@@ -45,9 +50,7 @@ def test_the_wheels_ask_for_the_same_at_every_step():
 
 
 def test_a_car_without_a_linear_part_is_the_same_too():
-    pytest.importorskip(
-        "fastsim", reason='FASTSim is not installed: pip install "hevopt[cross-tool]"'
-    )
+    needs_fastsim()
     from hevopt.reproduction.cross_tool.wheels import hold_wheels
 
     found = hold_wheels(load_architecture("prius_2001"), load_cycle("us06"))
@@ -97,9 +100,7 @@ def test_gears_are_told_by_one_efficiency(car, efficiency):
 
 def test_a_linear_part_is_a_grade():
     """The grade that stands for r1 v: m g sin + r0 cos = r0 + r1 v, by hand for the Camry at 20 m/s."""
-    pytest.importorskip(
-        "fastsim", reason='FASTSim is not installed: pip install "hevopt[cross-tool]"'
-    )
+    needs_fastsim()
     from hevopt.reproduction.cross_tool.tool import PLAIN, template
     from hevopt.reproduction.cross_tool.wheels import road_of, tell
 
@@ -145,7 +146,7 @@ def test_the_committed_page_is_that_of_this_model():
 def test_what_is_wrong_is_one_message(words, missing, said, monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
     if missing:
-        monkeypatch.setitem(__import__("sys").modules, "fastsim", None)
+        monkeypatch.setitem(sys.modules, "fastsim", None)
     monkeypatch.setattr("sys.argv", ["hevopt", "validation", "--fastsim", *words])
     with pytest.raises(SystemExit) as stop:
         main()

@@ -71,8 +71,9 @@ def template(name: str) -> dict[str, Any]:
 
 def powertrain(vehicle: Mapping[str, Any]) -> dict[str, Any]:
     """The part of a vehicle that holds engine, machine, battery and transmission."""
+    found: dict[str, Any]
     (found,) = vehicle["pt_type"].values()
-    return dict(found) if not isinstance(found, dict) else found
+    return found
 
 
 def curve(fractions: Array, values: Array) -> dict[str, Any]:
