@@ -70,6 +70,8 @@ _NONE: frozenset[str] = frozenset()
 # A car without an engine: nothing to start and to shift, whose charge ends as it is driven.
 _ELECTRIC = frozenset({"electric"})
 _RULE = "present step; its parameters are calibrated on the cycle"
+# Whether it holds the engine on comes from the steps before.
+_HYSTERESIS = "past and present; its parameters are calibrated on the cycle"
 
 STRATEGIES: dict[str, Strategy] = {
     "baseline": Strategy(
@@ -94,14 +96,14 @@ STRATEGIES: dict[str, Strategy] = {
     ),
     "power_follower": Strategy(
         power_follower.solve,
-        _RULE,
+        _HYSTERESIS,
         _HYBRID | {"free_engine_speed"},
         start=power_follower.start,
         start_on=power_follower.start_on,
     ),
     "thermostat": Strategy(
         thermostat.solve,
-        _RULE,
+        _HYSTERESIS,
         _HYBRID | {"series"},
         start=thermostat.start,
         start_on=thermostat.start_on,

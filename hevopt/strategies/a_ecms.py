@@ -15,17 +15,17 @@ base: the fuel that it takes to store a joule more. With an engine of free speed
 the car's own: `storing_kgpj` of the problem, derived from the maps of engine and generator in car/storing.py. Where
 the engine's speed is the road's, it runs anyway: 1 / (0.45 x 0.94 x 42.9 MJ/kg), at the slope of work over fuel
 energy of a diesel engine under load and the efficiency of the machine. Either is over the battery's coulombic
-efficiency. A switch, a start above all, pays only its share `start_share` at once, of fuel and
-stored energy alike: the engine runs for some steps after it. One that has to pay within a step comes
-too late, one that pays nothing makes the engine chatter. Feedback on the charge is that of J. T. B. A. Kessels,
-M. W. T. Koot, P. P. J. van den Bosch and D. B. Kok, "Online energy management for hybrid electric vehicles", IEEE
-Trans. Veh. Technol. 57 (2008), and of S. Onori and L. Serrao, "On adaptive-ECMS strategies for hybrid electric
-vehicles", Int. Conf. Hybrid and Electric Vehicles, Paris (2011); the speed in the reference, the share of the
-start and the figures of `FEEDBACK` are this project's [E]: one set for C1, C2, D and E over the nine shipped
-cycles, by random search for the least mean gap to the bound among sets that keep C2 and D neutral on NEDC and
-WLTC. That was with starts of 0.2 g alone (mean gap 1.6 %, largest 2.9 %); since they take stored energy too, and
-the battery loses more, the same set loses 2.9 % in the mean and 5 % at most. A weight on NOx makes charge dearer,
-and only the feedback knows: at 20 kg/kg the end charge of NEDC falls short by 1 to 4 % of the fuel's energy.
+efficiency. A switch, a start above all, pays only its share `start_share` at once, of fuel and stored energy alike:
+the engine runs for some steps after it. One that has to pay within a step comes too late, one that pays nothing
+makes the engine chatter. Feedback on the charge is that of J. T. B. A. Kessels, M. W. T. Koot, P. P. J. van den
+Bosch and D. B. Kok, "Online energy management for hybrid electric vehicles", IEEE Trans. Veh. Technol. 57 (2008),
+and of S. Onori and L. Serrao, "On adaptive-ECMS strategies for hybrid electric vehicles", Int. Conf. Hybrid and
+Electric Vehicles, Paris (2011); the speed in the reference, the share of the start and the figures of `FEEDBACK`
+are this project's [E]: one set for C1, C2, D and E over the nine shipped cycles, by random search for the least
+mean gap to the bound among sets that keep C2 and D neutral on NEDC and WLTC. That was with starts of 0.2 g alone
+(mean gap 1.6 %, largest 2.9 %); since they take stored energy too, and the battery loses more, the same set loses
+2.9 % in the mean and 5 % at most. A weight on NOx makes charge dearer, and only the feedback knows: at 20 kg/kg the
+end charge of NEDC falls short by 1 to 4 % of the fuel's energy.
 
 It knows row k and those before it, the charge and these figures: neither what comes nor when the cycle ends.
 `window_s` lets the base move too: every quarter of a window it becomes the constant factor that would have kept

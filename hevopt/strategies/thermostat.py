@@ -3,9 +3,8 @@
 Below `thermostat_on_soc` it starts and takes, at every step, the control of least cost per energy that is stored
 more than in driving without fuel, or drawn less, the battery's losses at the start's charge taken off; at
 `thermostat_off_soc` it stops. Where nothing drives the car without fuel, the engine gives what is asked for and
-leaves the battery alone. M. Ehsani, Y. Gao and
-A. Emadi, Modern Electric, Hybrid Electric, and Fuel Cell Vehicles, CRC Press 2010, call it engine on-off or
-thermostat control, in the chapter on series hybrids.
+leaves the battery alone. M. Ehsani, Y. Gao and A. Emadi, Modern Electric, Hybrid Electric, and Fuel Cell Vehicles,
+CRC Press 2010, call it engine on-off or thermostat control, in the chapter on series hybrids.
 
 What the car's file leaves open in `[rules]` is calibrated on the cycle: of all pairs on a grid over the window, the
 member of least charge-corrected cost among those whose end charge is near the asked one.
