@@ -3,8 +3,9 @@
 import pytest
 
 from hevopt import DataError, load_architecture
-from hevopt.car.handling import Handling, check_ranges
+from hevopt.car.handling import Clutch, DriverGains, Handling, Shifting, Tyre, check_ranges
 from hevopt.car_files.handling import ClutchFile, DriverFile, ShiftingFile, TyreFile
+from hevopt.car_files.handling_meanings import HANDLING_MEANINGS
 from hevopt.forward.run import shifting_of
 
 
@@ -59,3 +60,12 @@ def test_files_and_loops_allow_the_same(model, place):
 def test_every_key_is_one_of_the_loops():
     for model, part in zip((TyreFile, ClutchFile, DriverFile), (0, 1, 3), strict=True):
         assert set(model.model_fields) <= set(Handling()[part]._fields)
+
+
+@pytest.mark.parametrize("part", [Tyre(), Clutch(), Shifting(), DriverGains()])
+def test_what_the_schema_says_of_keys_left_out_is_what_holds(part):
+    table = type(part).__name__.replace("Gains", "") + "File"
+    for key, (_, meaning) in HANDLING_MEANINGS[table].items():
+        if key != "gap_s":  # that of the gearbox's file
+            said = meaning.removesuffix(" where left out").rsplit("; ", 1)[1]
+            assert float(said) == getattr(part, key), key
