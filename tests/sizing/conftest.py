@@ -8,7 +8,7 @@ END = 196
 
 
 @pytest.fixture(scope="session")
-def urban(tmp_path_factory):
+def urban_file(tmp_path_factory):
     """The first urban part of the NEDC, its gears listed."""
     lines = load_cycle("nedc")
     path = tmp_path_factory.mktemp("cycle") / "urban.csv"
@@ -18,4 +18,9 @@ def urban(tmp_path_factory):
             f"{lines.time_s[k]:g},{3.6 * lines.speed_mps[k]:.9f},{lines.gear[k]},{int(lines.clutch_open[k])}"
         )
     path.write_text("\n".join(rows) + "\n")
-    return load_cycle(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def urban(urban_file):
+    return load_cycle(urban_file)

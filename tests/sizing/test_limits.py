@@ -105,14 +105,10 @@ def test_constraints_that_no_car_meets_are_said():
     assert space.apart and not space.within and len(space.root.rows) == 0
 
 
-def test_a_sizing_says_which_constraints_its_range_is_proven_within(urban, tmp_path):
-    lines = urban.time_s, urban.speed_mps, urban.gear, urban.clutch_open
-    rows = [f"{t:g},{3.6 * v:.9f},{g},{int(c)}" for t, v, g, c in zip(*lines, strict=True)]
-    head = "time_s,speed_kmh,gear,clutch_open"
-    (tmp_path / "urban.csv").write_text("\n".join([head, *rows]) + "\n")
+def test_a_sizing_says_which_constraints_its_range_is_proven_within(urban_file, tmp_path):
     square = "machine.scale.power ** 2 >= 0.3"
     (tmp_path / "s.toml").write_text(
-        f'architecture = "C2"\ncycles = ["urban.csv"]\nconstraints = ["{CELLS}", "{square}"]\n'
+        f'architecture = "C2"\ncycles = ["{urban_file}"]\nconstraints = ["{CELLS}", "{square}"]\n'
         "[parameters]\nmachine.scale.power = { from = 0.6, to = 1.6 }\n"
         "battery.cells_in_series = [40, 64]\n"
     )
