@@ -50,7 +50,7 @@ def least_fuel(problem):
 def example():
     """The thermostat of the documentation: its text, and the function."""
     block = re.search(r"```python\n(.*?)```", HOWTO.read_text(), re.S)[1]
-    text = block[block.index("def thermostat") :]
+    text = block[block.index("def my_thermostat") :]
     names = {"np": np, "stepwise": stepwise, "compare": lambda *_, strategies: strategies}
     exec(text, names)
     return text, names["comparison"]
@@ -66,10 +66,10 @@ def test_the_thermostat_of_the_documentation_is_certified_in_table_and_page(shor
     collector = Collector()
     comparison = compare(short, "C2", strategies, observe=collector.observe)
     own, dp = comparison.rows
-    assert (own.strategy, dp.strategy) == ("thermostat", "dp") and own.solved
+    assert (own.strategy, dp.strategy) == ("my_thermostat", "dp") and own.solved
     assert own.bound_l_per_100km <= own.fuel_l_per_100km and own.gap_percent > dp.gap_percent
     page = comparison_page(collector.results(comparison, "hevopt compare"))
-    assert 'data-text="thermostat"' in page
+    assert 'data-text="my_thermostat"' in page
 
 
 def test_a_list_mixes_names_and_pairs_and_a_registered_name_is_known(short):
@@ -140,7 +140,7 @@ WRONG = {
     "out of range": (wrong_switch, "control -7 at step 1"),
     "no control": (lambda p: np.full(steps(p), 10**6), "control 1000000 at step 0"),
     "writes": (lambda p: p.table.fuel_kg.fill(0), "raised ValueError: .*read-only"),
-    "by a rule": (lambda p: stepwise(p, lambda now: 10**6), "the rule chose control 1000000 at step 0"),
+    "by a rule": (lambda p: stepwise(p, lambda now: 10**6), "the rule chose 1000000 at step 0"),
     "by no rule": (lambda p: stepwise(p, lambda now: None), "the rule chose None at step 0"),
 }  # fmt: skip
 
