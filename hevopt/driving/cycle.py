@@ -158,7 +158,7 @@ def _cycle(path: Path, text: str, tell: Tell) -> Cycle:
     speed_mps = columns[speed_column] * factor
     grade = columns.get("grade", np.zeros(len(rows)))
     check_time_and_speed(lines, columns["time_s"], speed_mps, speed_column, factor, tell)
-    check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell)
+    check_range(lines, "grade", grade, -GRADE_MAX, GRADE_MAX, tell, ", rise over run: 5 % is 0.05")
     auxiliary = columns.get("auxiliary_power_w")
     if auxiliary is not None:
         check_range(lines, "auxiliary_power_w", auxiliary, 0.0, _AUXILIARY_MAX_W, tell)

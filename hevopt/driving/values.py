@@ -65,10 +65,11 @@ def check_range(
     low: float,
     high: float,
     tell: Tell,
+    meaning: str = "",
 ) -> None:
-    """Values must lie within low and high."""
+    """Values must lie within low and high; meaning: what else the message says of them."""
     for k in np.flatnonzero((values < low) | (values > high)):
-        tell(lines[k], f"{column} is {values[k]:g}; allowed: {low:g} to {high:g}")
+        tell(lines[k], f"{column} is {values[k]:g}; allowed: {low:g} to {high:g}{meaning}")
 
 
 def whole_numbers(

@@ -108,8 +108,9 @@ def notes(driven: DrivenPlan) -> str:
         f"charge at the end {driven.charge_error:+.4f} against the backward run's",
         f"forward against backward, charge-corrected: {driven.change_percent:+.2f} %; by kind of step: "
         + ", ".join(f"{kind} {value:+.2f} %" for kind, value in driven.difference_percent.items()),
-        "bound: of the backward problem, a car that follows the trace to the point and makes up for each gap of a "
-        "change within its step; who drives otherwise, within the tolerance, may burn a little less",
+        "bound: of the backward problem at the forward run's end charge, over the forward run's distance, so for "
+        "that row alone; its car follows the trace to the point and makes up for each gap of a change within its "
+        "step; who drives otherwise, within the tolerance, may burn a little less",
         "energy that does not add up, as a share of what passed the wheels: "
         + ", ".join(f"{name} {value:.0e}" for name, value in run.residual.items()),
     ]

@@ -9,6 +9,7 @@ from itertools import product
 from math import prod
 from typing import TYPE_CHECKING, Any
 
+from hevopt.errors import DataError
 from hevopt.sizing.candidates import Candidate, Candidates, Fate
 from hevopt.sizing.study_file import SizeStudy
 from hevopt.sweeps.plan.parameters import Range, Scalar, Values
@@ -40,6 +41,18 @@ def is_lattice(study: SizeStudy) -> bool:
     levels = [levels_of(values) for values in study.sweep.parameters.values()]
     sizes = [len(of) for of in levels if of is not None]
     return len(sizes) == len(levels) and prod(sizes) <= study.trials
+
+
+def check_search(study: SizeStudy) -> None:
+    """DataError, before a store is made, where designs must be proposed and nobody is there to do so."""
+    if not is_lattice(study):
+        try:
+            import optuna  # noqa: F401
+        except ImportError:
+            raise DataError(
+                "parameters: not a lattice of at most `trials` designs, so that Optuna proposes them, which is not "
+                'installed; run: pip install "hevopt[sizing]", or list values and raise trials'
+            ) from None
 
 
 def search(study: SizeStudy, candidates: Candidates, done: Callable[[int], None]) -> None:

@@ -16,7 +16,7 @@ from hevopt.sizing.candidates import Candidate, Candidates, Fate
 from hevopt.sizing.proof.modes import NotProvable
 from hevopt.sizing.proof.prove import RangeProof, prove
 from hevopt.sizing.proof.space import SIZES
-from hevopt.sizing.search import is_lattice, search
+from hevopt.sizing.search import check_search, is_lattice, search
 from hevopt.sizing.study_file import SizeStudy, read_size_study
 from hevopt.studies.provenance import files_digests
 from hevopt.sweeps.into_store import check_sweep
@@ -118,6 +118,7 @@ def sized(study: Path, place: Path, execution: Execution, command: str, watch: O
     """The same for the command line. command: what repeats it. Raises Stopped, too."""
     check_sweep(execution, study, place)
     read = read_size_study(study)
+    check_search(read)
     _warn_of_weightless(read, watch)
     advance = Advance(read.trials)
     with locked(place), open_store(place) as opened, ExitStack() as stack, watch.held():

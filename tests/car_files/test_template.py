@@ -81,6 +81,7 @@ def test_every_key_is_explained_and_keeps_its_source(tmp_path):
     battery = (tmp_path / "components" / "mine_battery.toml").read_text()
     assert "min = 0.4  # no source named" in battery
     assert "hybrid_mass_kg = 70.0  # [E]" in path.read_text()
+    assert "kind series; shipped: none\n" in path.read_text()
 
 
 def test_a_measured_map_is_copied_cell_by_cell(tmp_path):

@@ -84,3 +84,11 @@ def test_a_log_in_place_of_a_cycle_file_is_sent_to_the_import(tmp_path, name, te
     (tmp_path / name).write_text(text)
     with pytest.raises(DataError, match="`hevopt cycles import FILE --out NAME"):
         load_cycle(tmp_path / name)
+
+
+def test_a_grade_in_per_cent_is_told_what_it_should_be(tmp_path):
+    (tmp_path / "hill.csv").write_text("time_s,speed_mps,grade\n0,0,5\n1,2,5\n")
+    with pytest.raises(
+        DataError, match=r"grade is 5; allowed: -0.5 to 0.5, rise over run: 5 % is 0.05"
+    ):
+        load_cycle(tmp_path / "hill.csv")

@@ -1,6 +1,7 @@
 """Sizing: requirements by the performance models, the best of a lattice by hand, the search, and what is wrong."""
 
 import json
+import sys
 from itertools import pairwise, product
 
 import pytest
@@ -182,3 +183,13 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_store(tmp_path, mon
     found = json.loads(again.out)
     assert found["lattice"] and found["designs"]["tried"] == 2
     assert found["best"]["values"][0] >= found["least_bound"] > 0
+
+
+def test_ranges_without_optuna_are_one_message_and_leave_no_store(tmp_path, monkeypatch, capsys):
+    (tmp_path / "short.csv").write_text(CYCLE)
+    path = tmp_path / "s.toml"
+    path.write_text(HEAD + "[parameters]\nmachine.scale.power = { from = 0.9, to = 1.1 }\n")
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    seen = call(monkeypatch, capsys, "size", path)
+    assert seen.status == 2 and 'pip install "hevopt[sizing]"' in seen.err, seen.err
+    assert not (tmp_path / "s.sqlite").exists()
