@@ -33,6 +33,8 @@ class Breathing:
     """
 
     def __init__(self, car: Architecture, side_radps: float, torque_nm: float = 0.0) -> None:
+        if car.electric:
+            raise DataError(f"{car.name}: it has no engine; leave --engine-model mean_value out")
         diesel = mean_value_of(f"{car.source}, engine", car.contents["engine"])
         self._model = model_of(diesel, BENCH, Drive(held=1.0))
         full = float(np.interp(side_radps, *curve_of(diesel.curves, FULL_LOAD)))

@@ -46,9 +46,10 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     speed = np.linspace(0.1, 300 / KMH_PER_MPS, 1200)
     wheel = speed / radius
     forces = []
+    launch = 0.0 if car.electric else LAUNCH_RPM / RPM_PER_RADPS
     for way in by_gear(line):
         ratio = ways.wheel[way, -1]
-        side = np.maximum(ratio * wheel, LAUNCH_RPM / RPM_PER_RADPS if way == 0 else 0.0)
+        side = np.maximum(ratio * wheel, launch if way == 0 else 0.0)
         full = tabulated(limits.full_nm, limits.engine_step, side)
         machine_speed = ways.wheel[way, 1] * wheel + ways.side[way, 1] * side
         machine = np.zeros_like(speed)
@@ -93,8 +94,13 @@ def slope_at(car: Architecture, curves: Curves, speed_mps: float, handling: Hand
     return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)
 
 
-def start_slope(car: Architecture, driven: LoopCar, handling: Handling) -> float:
-    """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip."""
+def start_slope(car: Architecture, driven: LoopCar, handling: Handling, curves: Curves) -> float:
+    """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip.
+
+    Without an engine what the machine gives at the slowest speed of the curves.
+    """
+    if car.electric:
+        return slope_at(car, curves, float(curves.speed_mps[0]), handling)
     limits, ways = driven.limits, driven.ways
     launch = LAUNCH_RPM / RPM_PER_RADPS
     full = float(tabulated(limits.full_nm, limits.engine_step, launch))

@@ -2,7 +2,8 @@
 
 The ways are those in which the driver's clutch slips, so that the engine's side turns by itself: the wheels and
 that side are free, every joint but the clutch gives a speed row, and the torques on the units reach wheels and side
-by the balance of the other shafts. A closed clutch is then a torque, an open one none.
+by the balance of the other shafts. A closed clutch is then a torque, an open one none. A car without an engine has
+that side as well, with nothing on it: it rests.
 """
 
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from hevopt.forward._rows_kernels import Ways
 
 _NET = "net torque on "
 _OUTPUT = "clutch's output"
+_NO_ENGINE = "engine's side of a car that has none"
+_ONLY_GEAR = 1
 Key = tuple[int, tuple[tuple[str, int], ...], frozenset[str]]
 
 
@@ -85,8 +88,8 @@ def _check(car: Architecture) -> None:
     line, lacking = car.driveline, ""
     odd = [part.name for part in line.parts if not isinstance(part, Gear | Gearbox | Clutch)]
     odd += [p.name for p in line.parts if isinstance(p, Clutch) and p.operation != "driver"]
-    if line.engine is None or not line.boxes or not line.driver_clutches:
-        lacking = "it has no engine behind a driver's clutch and gears"
+    if line.engine is not None and not (line.boxes and line.driver_clutches):
+        lacking = "its engine is behind no driver's clutch and gears"
     elif line.free_engine_speed:
         lacking = "its engine's speed is free"
     elif car.gearbox is not None and car.gearbox.loss is not None:
@@ -102,7 +105,7 @@ def _check(car: Architecture) -> None:
     if lacking:
         raise DataError(
             f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "
-            "machine, and an engine behind a driver's clutch and gears, can; `hevopt run` solves it backward"
+            "machine, and no engine or one behind a driver's clutch and gears, can; `hevopt run` solves it backward"
         )
 
 
@@ -113,7 +116,7 @@ def _limited(line: Driveline) -> list[Gear]:
 def _keys(line: Driveline) -> list[Key]:
     """Every listed gear with every choice beside it that goes with it, couplings closed, then open."""
     chosen = [box for box in line.boxes if box.choice == "preselected"]
-    listed = sorted(gear for box in line.boxes for gear in box.gears)
+    listed = sorted(gear for box in line.boxes for gear in box.gears) or [_ONLY_GEAR]
     opened = [frozenset[str](), *(frozenset([part.name]) for part in _limited(line))]
     keys: list[Key] = []
     for open_, gear in product(opened, listed):
@@ -125,6 +128,8 @@ def _keys(line: Driveline) -> list[Key]:
 
 def _way(line: Driveline, key: Key) -> Way:
     gear, gears, opened = key
+    if line.engine is None:
+        return way(line, State(False, gears), Phase(False, "open", None, opened))
     box = next(box.name for box in line.boxes if gear in box.gears)
     return way(line, State(True, gears), Phase(False, "slipping", box, opened))
 
@@ -142,10 +147,10 @@ def _fill(
     units: tuple[str, ...], gear: int,
 ) -> None:  # fmt: skip
     """One way's entries."""
-    clutch = next(joint for joint in joints if not joint.speed)
-    side = next(iter(found.held))
-    at = dict(found.active)
-    at[_OUTPUT] = next(shaft for shaft, (c0, _) in clutch.reaction.items() if float(c0) > 0)
+    clutch = next((joint for joint in joints if not joint.speed), None)
+    side, at = next(iter(found.held), _NO_ENGINE), dict(found.active)
+    if clutch is not None:
+        at[_OUTPUT] = next(shaft for shaft, (c0, _) in clutch.reaction.items() if float(c0) > 0)
     rates = speeds_of(found)
 
     def rate(shaft: str, base: str) -> float:
@@ -155,6 +160,8 @@ def _fill(
     for u, name in enumerate((*units, _OUTPUT)):
         if name in at:
             ways.wheel[n, u], ways.side[n, u] = rate(at[name], WHEEL), rate(at[name], side)
+        elif name == ENGINE:
+            ways.side[n, u] = 1.0
     for j, name in enumerate(lossy):
         joint = next((joint for joint in joints if joint.name == name), None)
         if joint is not None:
@@ -169,7 +176,7 @@ def _fill(
                 (WHEEL, ways.wheel, ways.wheel_yield),
                 (side, ways.side, ways.side_yield),
             ):
-                if of_unit[n, u] != 0.0:
+                if of_unit[n, u] != 0.0 and _NET + base in sums:
                     passed = float(sums[_NET + base].get(name, 0.0))
                     yields[n, variant, u] = passed / of_unit[n, u]
             for j, joint_name in enumerate(lossy):
@@ -177,7 +184,7 @@ def _fill(
 
 
 def _sums(
-    found: Way, joints: tuple[Joint, ...], clutch: Joint, side: str, at: dict[str, str],
+    found: Way, joints: tuple[Joint, ...], clutch: Joint | None, side: str, at: dict[str, str],
     lossy: tuple[str, ...], variant: int,
 ) -> dict[str, Terms]:  # fmt: skip
     """Torque in each joint, and left on wheels and engine's side, in terms of the torques on the units."""

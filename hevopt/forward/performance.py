@@ -50,10 +50,11 @@ class Performance(Shown):
 
     to_speed_s: km/h -> time from rest; to_distance: m -> time from rest, and speed there in m/s
     in_gear_s, in_gear_j: (gear, from km/h, to km/h) -> time, and energy from the battery until then
-    top_mps: gear -> highest speed of the engine alone
+    top_mps: gear -> highest speed of the engine alone; of the machine where there is no engine
     start_slope: highest slope, rise over run, to start off on, by clutch and engine or by grip
     slope: km/h -> highest slope at that speed, in the best gear
     to_100_j: energy from the battery up to 100 km/h; repeats: how often until its window is empty, from soc_start
+    boosts: whether the machine helps the engine; False without one, where it drives alone
     engine_model: of what is driven; top speeds and slopes are by the file's full load
     fills: the machine adds no more than what the engine lacks of its steady full load
     curves: the forces of `forces_of`; trace: (step, column) of the run from rest, see _pull_kernels
@@ -124,14 +125,11 @@ def performance(
     loaded, line = _loaded(car, added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
     driven = loop_car(loaded, line, handling._replace(shifting=shifting))
-    foot = Foot(
-        LAUNCH_RPM / RPM_PER_RADPS, UP_RPM / RPM_PER_RADPS, boosts or fills, fills, float(boost_lag_s),
-        _NATURAL_SHARE,
-    )  # fmt: skip
+    foot = _foot(car, boosts, fills, boost_lag_s)
     start_j = float(energy_j(car.battery, car.soc_start))
     floored = _Floored(loaded, driven, by_gear(line), foot, start_j, engine_model)
     trace = _pulled(floored, 0.0, 0, max(SPEEDS_KMH), max(DISTANCES_M))
-    curves = forces_of(loaded, line, driven, boosts)
+    curves = forces_of(loaded, line, driven, boosts or car.electric)
     engine = forces_of(loaded, line, driven, False) if boosts else curves
     in_gear = _in_gear(floored)
     used, helps = _to_100_j(trace, start_j), boosts or fills
@@ -142,15 +140,24 @@ def performance(
         {distance: _at_distance(trace, distance) for distance in DISTANCES_M},
         {case: None if at is None else at[0] for case, at in in_gear.items()},
         {gear + 1: top_mps(engine, gear) for gear in range(len(floored.ways))},
-        start_slope(loaded, driven, handling),
+        start_slope(loaded, driven, handling, curves),
         {kmh: slope_at(loaded, curves, kmh / KMH_PER_MPS, handling) for kmh in SUSTAINED_KMH},
         used,
-        _repeats(car, start_j, used) if helps and used else None,
+        _repeats(car, start_j, used) if (helps or car.electric) and used else None,
         curves,
         trace,
         {case: None if at is None else at[1] for case, at in in_gear.items()},
         engine_model,
         fills,
+    )
+
+
+def _foot(car: Architecture, boosts: bool, fills: bool, boost_lag_s: float) -> Foot:
+    """The pedal floored; a car without an engine launches and changes up at no speed of it, all by its machine."""
+    launch, up = (0.0, np.inf) if car.electric else (LAUNCH_RPM, UP_RPM)
+    helps = boosts or fills or car.electric
+    return Foot(
+        launch / RPM_PER_RADPS, up / RPM_PER_RADPS, helps, fills, float(boost_lag_s), _NATURAL_SHARE
     )
 
 
@@ -259,11 +266,13 @@ def _at_distance(trace: Array, distance_m: float) -> tuple[float, float] | None:
 def _in_gear(floored: _Floored) -> dict[tuple[int, int, int], tuple[float, float] | None]:
     """Time and energy from the battery, from third gear on, and 40 to 80 km/h in fourth.
 
-    None where the engine turns too slowly or fast, or the speed is not reached.
+    Without an engine in the one gear there is. None where the engine turns too slowly or fast, or the speed is
+    not reached.
     """
     driven, ways = floored.driven, floored.ways
     held = floored._replace(foot=floored.foot._replace(up_radps=np.inf))
-    cases = [(gear, *pair) for gear in range(3, len(ways) + 1) for pair in IN_GEAR_KMH]
+    lowest = 1 if floored.car.electric else 3
+    cases = [(gear, *pair) for gear in range(lowest, len(ways) + 1) for pair in IN_GEAR_KMH]
     if len(ways) >= 4:
         cases.append((4, *FOURTH_KMH))
     found: dict[tuple[int, int, int], tuple[float, float] | None] = {}

@@ -35,25 +35,34 @@ SINKS = {
     "auxiliary_power_w": "auxiliaries",
 }
 _TINY_J = 0.5
+_BOUND_NOTE = (
+    "bound: of the backward problem at the forward run's end charge, over the forward run's distance, so for "
+    "that row alone; its car follows the trace to the point and makes up for each gap of a change within its "
+    "step; who drives otherwise, within the tolerance, may burn a little less"
+)
 
 
 def twin_table(driven: DrivenPlan) -> Table:
     """The run, its backward twin and the bound of that."""
     run, back = driven.run, driven.backward
     title = f"{run.car.name}, {driven.strategy} on {run.cycle.name}"
-    table = _table(printable(title), "", "fuel\nl/100 km", "corrected\nl/100 km", "NOx\nmg/km",
-                   "SOC\nend", "starts\n", "status\n")  # fmt: skip
+    table = _table(printable(title), "", "fuel\nl/100 km", "corrected\nl/100 km", "battery\nkWh/100 km",
+                   "NOx\nmg/km", "SOC\nend", "starts\n", "status\n")  # fmt: skip
     table.add_row(
-        "forward", f"{driven.fuel_l_per_100km:.4f}", f"{driven.corrected_l_per_100km:.4f}",
-        number(driven.nox_mg_per_km, 1), f"{run.soc[-1]:.4f}", f"{run.starts}",
+        "forward", f"{driven.fuel_l_per_100km:.4f}", number(driven.corrected_l_per_100km, 4),
+        f"{driven.electricity_kwh_per_100km:.3f}", number(driven.nox_mg_per_km, 1), f"{run.soc[-1]:.4f}",
+        f"{run.starts}",
         Text(", ".join(driven.marks) or "ok"),
     )  # fmt: skip
     table.add_row(
         "backward", number(back.fuel_l_per_100km, 4), number(back.fuel_corrected_l_per_100km, 4),
-        number(back.nox_mg_per_km, 1), number(back.soc_end, 4), f"{back.engine_starts}",
+        number(back.electricity_kwh_per_100km, 3), number(back.nox_mg_per_km, 1), number(back.soc_end, 4),
+        f"{back.engine_starts}",
         Text(str(back.status)),
     )  # fmt: skip
-    table.add_row("bound", f"{driven.bound_l_per_100km:.4f}", "", "", f"{run.soc[-1]:.4f}", "", "")
+    if driven.bound_l_per_100km is not None:
+        bound = f"{driven.bound_l_per_100km:.4f}"
+        table.add_row("bound", bound, "", "", "", f"{run.soc[-1]:.4f}", "", "")
     return table
 
 
@@ -106,15 +115,18 @@ def notes(driven: DrivenPlan) -> str:
         f"at full load {run.full.sum() * run.step_s:.1f} s; "
         f"distance {run.distance_m - run.cycle.distance_m:+.2f} m; "
         f"charge at the end {driven.charge_error:+.4f} against the backward run's",
-        f"forward against backward, charge-corrected: {driven.change_percent:+.2f} %; by kind of step: "
+        f"forward against backward, {compared(driven)}: {driven.change_percent:+.2f} %; by kind of step: "
         + ", ".join(f"{kind} {value:+.2f} %" for kind, value in driven.difference_percent.items()),
-        "bound: of the backward problem at the forward run's end charge, over the forward run's distance, so for "
-        "that row alone; its car follows the trace to the point and makes up for each gap of a change within its "
-        "step; who drives otherwise, within the tolerance, may burn a little less",
+        *([] if run.car.electric else [_BOUND_NOTE]),
         "energy that does not add up, as a share of what passed the wheels: "
         + ", ".join(f"{name} {value:.0e}" for name, value in run.residual.items()),
     ]
     return "\n".join(lines)
+
+
+def compared(driven: DrivenPlan) -> str:
+    """What of a run stands against its backward twin's."""
+    return "energy from the battery" if driven.run.car.electric else "charge-corrected"
 
 
 def how_text(driven: DrivenPlan) -> str:
@@ -171,6 +183,7 @@ def as_dict(driven: DrivenPlan) -> dict[str, Any]:
         "engine_model": "map" if run.against_map_percent is None else "mean_value",
         "fuel_against_map_percent": run.against_map_percent,
         "fuel_l_per_100km": driven.fuel_l_per_100km,
+        "electricity_kwh_per_100km": driven.electricity_kwh_per_100km,
         "corrected_l_per_100km": driven.corrected_l_per_100km,
         "bound_l_per_100km": driven.bound_l_per_100km,
         "nox_mg_per_km": driven.nox_mg_per_km,

@@ -38,7 +38,7 @@ def speed_table(found: Sequence[Performance]) -> Table:
                 if there is None
                 else [f"{there[0]:.2f}", f"{there[1] * KMH_PER_MPS:.0f}"]
             )
-        used = of.to_100_j if of.boosts else None
+        used = of.to_100_j if of.boosts or of.car.electric else None
         cells.append("-" if used is None else f"{used / 1e3:.0f}")
         cells.append(number(of.repeats, 1))
         table.add_row(Text(of.name), *cells)

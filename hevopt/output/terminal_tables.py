@@ -181,7 +181,8 @@ def _forward_note(comparison: Comparison) -> str:
         if found.status != "ok"
     ]
     return (
-        "\ndriven: forward by a driver at the pedals, charge-corrected; against: the row's own corrected fuel; "
+        "\ndriven: forward by a driver at the pedals, charge-corrected; against: the row's own corrected fuel, "
+        "without an engine its energy from the battery; "
         "missed: times that the trace was left." + "".join(told)
     )
 

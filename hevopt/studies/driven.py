@@ -53,7 +53,9 @@ class DrivenPlan(Shown):
     corrected_l_per_100km: less what stored energy above the asked end charge is worth, at the price of the proof
     bound_l_per_100km: least of fuel and weighted NOx of any plan that follows the cycle to the same end charge; a
     car that is driven may fall below it, as it does not follow exactly, and its engine gives its momentum back
+    electricity_kwh_per_100km: stored energy that the way driven took from the battery
     difference_percent: kind of step -> forward less backward, charge-corrected, as a share of backward's
+    Without an engine there is neither corrected fuel nor its bound, and what differs is the stored energy taken.
     marks: what is to be known of the run beside its figures
     asked: how the strategy was asked on the way; None where its plan was replayed
     """
@@ -62,8 +64,9 @@ class DrivenPlan(Shown):
     strategy: str
     backward: Row
     fuel_l_per_100km: float
-    corrected_l_per_100km: float
-    bound_l_per_100km: float
+    electricity_kwh_per_100km: float
+    corrected_l_per_100km: float | None
+    bound_l_per_100km: float | None
     nox_mg_per_km: float | None
     difference_percent: Mapping[str, float]
     charge_error: float
@@ -72,9 +75,11 @@ class DrivenPlan(Shown):
 
     @property
     def change_percent(self) -> float:
-        """Charge-corrected fuel against the backward twin's."""
-        backward = self.backward.fuel_corrected_l_per_100km
-        return 100 * (self.corrected_l_per_100km / backward - 1) if backward else float("nan")
+        """Charge-corrected fuel against the backward twin's; without an engine the energy from the battery."""
+        own, twin = self.corrected_l_per_100km, self.backward.fuel_corrected_l_per_100km
+        if self.run.car.electric:
+            own, twin = self.electricity_kwh_per_100km, self.backward.electricity_kwh_per_100km
+        return 100 * (own / twin - 1) if own is not None and twin else float("nan")
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -102,7 +107,8 @@ def drive(
     """A strategy on a car on a cycle, driven forward by a driver at the pedals.
 
     step_s: 0.001 to 0.1 s; handling: tyres, clutch, gear changes and driver
-    asking: how often a strategy decides that can on the way; replay: its plan is driven, as that of all others is
+    asking: how often a strategy decides that can on the way; replay: its plan is driven, as that of all others and
+    of a car without an engine is, which leaves nothing to decide
     engine_model: "map", or "mean_value", which drives with the air that the engine has and whose fuel counts
     A trace that is missed is driven on, and the run says where. DataError for what cannot be driven forward.
     """
@@ -128,7 +134,7 @@ def drive_solved(
     """A case that a strategy has solved, with its row and trajectory, driven forward."""
     car, (row, trajectory), line = case.car, solved, line_of(case.car)
     asked = None
-    if how.replay or not decides(strategy):
+    if how.replay or not decides(strategy) or car.electric:
         plan = replay_of(trajectory, line)
         run = follow(
             car, case.cycle, plan, step_s=how.step_s, handling=how.handling, line=line,
@@ -162,15 +168,17 @@ def beside(
         return litres_per_100km(mass_kg, car.engine.fuel_density_kgpm3, run.distance_m)
 
     km = run.distance_m / 1e3
+    taken_j = float(run.energy_j[0]) - end_j
     return DrivenPlan(
         run,
         strategy,
         row,
         litres(run.fuel_kg),
-        litres(run.fuel_kg - price * surplus_j),
-        litres(case.certificate.bound_kg(end_j)[0]),
+        taken_j / 3.6e6 / km * 100,
+        None if car.electric else litres(run.fuel_kg - price * surplus_j),
+        None if car.electric else litres(case.certificate.bound_kg(end_j)[0]),
         run.nox_kg * 1e6 / km if car.engine.nox_known else None,
-        _difference(trajectory, run, price),
+        _difference(trajectory, run, 1.0 if car.electric else price),
         float(run.soc[-1] - np.interp(run.time_s[-1], case.cycle.time_s, trajectory.soc)),
         _marks(case, run, surplus_j),
         asked,
@@ -192,7 +200,8 @@ def _marks(case: Case, run: ForwardRun, surplus_j: float) -> tuple[str, ...]:
     if count := len(run.quality.violations):
         marks.append(f"trace missed {count} time{'s' if count > 1 else ''}")
     fuel_j = run.fuel_kg * run.car.engine.heating_value_jpkg
-    if not is_neutral(surplus_j, fuel_j):
+    # What a car without an engine has left above what is asked is what it is driven for.
+    if not is_neutral(surplus_j, fuel_j) and not (run.car.electric and surplus_j > 0):
         marks.append("end charge off by more than 1 %")
     slack = 1e-4 * (pack.soc_max - pack.soc_min)
     if run.soc.min() < pack.soc_min - slack or run.soc.max() > pack.soc_max + slack:
@@ -203,7 +212,10 @@ def _marks(case: Case, run: ForwardRun, surplus_j: float) -> tuple[str, ...]:
 
 
 def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> dict[str, float]:
-    """Charge-corrected fuel, forward less backward, by kind of step, in per cent of the backward one's."""
+    """Charge-corrected fuel, forward less backward, by kind of step, in per cent of the backward one's.
+
+    price_kgpj: what a joule taken from the battery counts; anything without an engine, where nothing else does
+    """
     table, flows, books = trajectory.problem.table, trajectory.flows, run.books.flows
     times = np.append(table.time_s, table.time_s[-1] + table.step_s[-1])
 
@@ -217,8 +229,8 @@ def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> d
     drained_j = flows["battery_chemical_w"] * table.step_s + trajectory.switch_energy_j
     backward = trajectory.fuel_kg + price_kgpj * drained_j
     kinds = kinds_of(trajectory, run, times)
-    end_min_j = trajectory.problem.end_min_j
-    total = trajectory.total_fuel_kg - price_kgpj * (trajectory.end_j - end_min_j)
+    asked_j = trajectory.energy_j[0] if run.car.electric else trajectory.problem.end_min_j
+    total = trajectory.total_fuel_kg - price_kgpj * (trajectory.end_j - asked_j)
     gap = 100 * (forward - backward) / total if total > 0 else forward * np.nan
     return {kind: float(np.sum(gap[kinds == n])) for n, kind in enumerate(KINDS)}
 

@@ -19,7 +19,7 @@ class ForwardFigures(Shown):
     """A row driven forward, see `DrivenPlan`; None where it could not be.
 
     status: its marks, "ok", or why it has no figures; decided: whether the strategy decided on the way
-    change_percent: charge-corrected fuel against the row's own
+    change_percent: charge-corrected fuel against the row's own; without an engine the energy from the battery
     """
 
     status: str
@@ -33,6 +33,7 @@ class ForwardFigures(Shown):
     bound_l_per_100km: float | None = None
     rmsse_kmh: float | None = None
     violations: int | None = None
+    electricity_kwh_per_100km: float | None = None
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -75,4 +76,5 @@ def figures_of(driven: "DrivenPlan") -> ForwardFigures:
         driven.bound_l_per_100km,
         run.quality.speed_error_mps * KMH_PER_MPS,
         len(run.quality.violations),
+        driven.electricity_kwh_per_100km,
     )

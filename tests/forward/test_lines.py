@@ -53,6 +53,15 @@ def test_the_gears_of_a_dual_clutch_exclude_each_other_and_the_nearest_is_taken(
     assert line.keys[line.index(2, even)][0] == 2
 
 
+def test_a_car_without_an_engine_has_one_way_and_a_side_at_rest():
+    car = load_architecture("electric_compact")
+    line = line_of(car)
+    assert line.keys == ((1, (), frozenset()),) and line.gears.tolist() == [1]
+    assert line.ways.wheel.tolist() == [[0, 3.93, 0]] and line.ways.side.tolist() == [[1, 0, 0]]
+    assert line.ways.wheel_yield[0, :, 1] == pytest.approx([0.97, 1 / 0.97])
+    assert line.ways.inertia_kgm2[0] == 0
+
+
 def test_a_coupling_that_opens_at_high_speed_has_ways_without_its_machine():
     car = load_architecture("D")
     line = line_of(car)

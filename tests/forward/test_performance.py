@@ -33,6 +33,34 @@ def test_e_boost_is_faster_everywhere_and_takes_its_energy_from_the_battery(name
     assert boosted.top_mps == pytest.approx(alone.top_mps, rel=1e-3)
 
 
+def test_a_car_without_an_engine_is_as_fast_as_its_machine_and_grip_let_it():
+    """Second way: dv/dt of the force curve, cut by the grip of an accelerating car, the tyre's lag left out."""
+    found = figures("electric_compact")
+    car, curves = found.car, found.curves
+    equivalent = (
+        car.vehicle.equivalent_mass_kg
+        + car.machines[0].inertia_kgm2 * (3.93 / car.vehicle.tyre_radius_m) ** 2
+    )
+    force = np.minimum(curves.by_gear_n[0], car.vehicle.mass_kg * Tyre().grip_mps2)
+    force = force - curves.resistance_n
+    speeds = np.linspace(0, 100 / 3.6, 20001)
+    time = np.trapezoid(equivalent / np.interp(speeds, curves.speed_mps, force), speeds)
+    assert found.to_speed_s[100] == pytest.approx(time, abs=0.15)
+    assert 8 < time < 11
+    kinetic = 0.5 * equivalent * (100 / 3.6) ** 2
+    assert kinetic < found.to_100_j < 1.6 * kinetic
+    assert set(found.in_gear_s) == {(1, 60, 100), (1, 80, 120)}
+    assert found.in_gear_s[1, 60, 100] == pytest.approx(
+        found.to_speed_s[100] - found.to_speed_s[60], abs=0.05
+    )
+    assert found.start_slope == pytest.approx(0.85 * 0.6 / (1 + 0.85 * 0.2), rel=0.01)
+
+
+def test_no_mean_value_engine_where_there_is_none():
+    with pytest.raises(DataError, match="it has no engine; leave --engine-model"):
+        figures("electric_compact", engine_model="mean_value")
+
+
 def test_mass_gap_and_lag_of_boost_cost_time_and_grip_gains_it():
     base = figures("A").to_speed_s[100]
     car = load_architecture("A")

@@ -11,7 +11,7 @@ from hevopt.car.handling import Clutch, DriverGains, Handling, Shifting, Tyre
 from hevopt.forward.stability import spectral_radius
 from hevopt.problem.battery import soc
 
-CARS = ("A", "B", "C1", "C2", "D", "E")
+CARS = ("A", "B", "C1", "C2", "D", "E", "electric_compact")
 
 
 @pytest.mark.parametrize("name", CARS)
@@ -58,8 +58,9 @@ def test_the_length_of_the_step_moves_fuel_by_less_than_a_fiftieth_of_a_per_cent
 
 
 @pytest.mark.parametrize(
-    ("name", "speed_kmh"), [("A", 50), ("A", 120), ("C2", 50), ("C2", 120), ("D", 90), ("E", 120)]
-)
+    ("name", "speed_kmh"), [("A", 50), ("A", 120), ("C2", 50), ("C2", 120), ("D", 90), ("E", 120),
+     ("electric_compact", 50), ("electric_compact", 120)],
+)  # fmt: skip
 def test_at_constant_speed_all_flows_are_those_of_the_backward_step(name, speed_kmh):
     car, cycle = load_architecture(name), constant(speed_kmh)
     open_loop = Handling(driver=DriverGains(charge_per_s=0.0))

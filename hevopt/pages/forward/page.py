@@ -11,7 +11,7 @@ from hevopt.forward.performance import (
     SUSTAINED_KMH,
     Performance,
 )
-from hevopt.output.driven_tables import audit, engine_text, how_text, trace_text
+from hevopt.output.driven_tables import audit, compared, engine_text, how_text, trace_text
 from hevopt.output.performance_tables import MEAN_VALUE_NOTE, NOTE
 from hevopt.pages.alert import Alert
 from hevopt.pages.forward.drawing import drawn_performance, drawn_run
@@ -38,6 +38,7 @@ def driven_page(driven: DrivenPlan, command: str) -> str:
         run=run,
         back=driven.backward,
         how=how_text(driven),
+        compared=compared(driven),
         trace=trace_text(run),
         alerts=_alerts(driven),
         given=[(name, value / 1e3) for name, value in found.items() if value > _TINY_J],
@@ -86,6 +87,9 @@ def _alerts(driven: DrivenPlan) -> list[Alert]:
     run, left = driven.run, driven.run.quality.violations
     full_s = float(run.full.sum() * run.step_s)
     given = f"all is given, and is too little, for {full_s:.1f} s" if full_s else "never too little"
+    neutral = "neutral within 1 % of the fuel's energy, in its window"
+    if run.car.electric:
+        neutral = "in its window"
     charge = [mark for mark in driven.marks if "charge" in mark]
     maps = [mark for mark in driven.marks if "map" in mark]
     open_ = [
@@ -99,10 +103,10 @@ def _alerts(driven: DrivenPlan) -> list[Alert]:
     ]
     return [
         Alert("Trace", bool(left), [trace_text(run)]),
-        Alert("Charge", bool(charge), charge or ["neutral within 1 % of the fuel's energy, in its window"]),
+        Alert("Charge", bool(charge), charge or [neutral]),
         Alert("Full load", full_s > 0, [given], grave=False),
         Alert("Measured maps", bool(maps), maps or ["never left"]),
         *([Alert("Engine", True, engine_text(run), grave=False)] if engine_text(run) else []),
         Alert("Balances", bool(open_), open_ or ["every component balances to rounding"]),
-        Alert("What the bound is", True, bound, grave=False),
+        *([] if run.car.electric else [Alert("What the bound is", True, bound, grave=False)]),
     ]  # fmt: skip
