@@ -23,7 +23,7 @@ from hevopt.forward._acting_kernels import (
 )
 from hevopt.forward._contact_kernels import Pace, pace_of
 from hevopt.forward._lever_kernels import Lever, changed, resting_lever
-from hevopt.forward._limits_kernels import Gives, by_map, electric_w
+from hevopt.forward._limits_kernels import Gives, by_map, electric_w, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import State, Ways, row_length, settled_rows, turning
@@ -159,7 +159,7 @@ def after_step(
     if phase == motor.STARTING:
         mean_n = 0.5 * (now.side_radps + state.side_radps)
         power += max(out.engine_nm * mean_n, 0.0) / car.limits.spin_efficiency
-    energy -= step_s * chemical_power_at(power, energy, car.battery)
+    energy -= step_s * chemical_power_at(terminal_w(power, car.limits), energy, car.battery)
     stuck = phase == motor.TURNING and joint.closing == 0.0 and not joint.launches
     stuck = stuck or lever.gap_s > 0.0
     pedal = remembered(pedal, (stuck and not wish.braking) or (given.full and

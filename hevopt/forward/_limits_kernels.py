@@ -21,6 +21,7 @@ class Limits(NamedTuple):
     loss_w: (machine speed, torque) from -torque_nm to torque_nm
     braking_share: (speed of the car, braking force over weight) share of the braking that may pass the machine's
     axle, over steps of braking_mps and braking_rate; empty where all may
+    converter_w, converter_share: (point,) of a converter between battery and bus; empty where they are one
     boosts, regenerates: whether the car's functions let the machine help at full load, and charge while braking
     """
 
@@ -42,6 +43,8 @@ class Limits(NamedTuple):
     braking_share: Array
     braking_mps: float
     braking_rate: float
+    converter_w: Array
+    converter_share: Array
     boosts: bool
     regenerates: bool
 
@@ -112,6 +115,15 @@ def electric_w(torque: float, speed: float, limits: Limits) -> float:
     low = limits.loss_w[i, j] + y * (limits.loss_w[i, j + 1] - limits.loss_w[i, j])
     high = limits.loss_w[i + 1, j] + y * (limits.loss_w[i + 1, j + 1] - limits.loss_w[i + 1, j])
     return torque * speed + low + x * (high - low)
+
+
+@compiled(inline="always")
+def terminal_w(bus_w: float, limits: Limits) -> float:
+    """Power at the battery's terminals for one at the bus, as of `Converter.terminal_w`."""
+    if len(limits.converter_w) == 0:
+        return bus_w
+    share = float(np.interp(abs(bus_w), limits.converter_w, limits.converter_share))
+    return bus_w / share if bus_w > 0.0 else bus_w * share
 
 
 @compiled()

@@ -16,7 +16,7 @@ from hevopt.forward._lever_kernels import (
     moves_machine,
     resting_lever,
 )
-from hevopt.forward._limits_kernels import Gives, at, by_map, electric_w
+from hevopt.forward._limits_kernels import Gives, at, by_map, electric_w, terminal_w
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Array, Inputs, State, row_length, settled_rows, turning
 from hevopt.forward._share_kernels import following_nm, machine_range, pace_nm
@@ -162,7 +162,7 @@ def after_pull(
     after = turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
     after = after * state.speed_mps / radius + car.ways.side[state.way, 1] * state.side_radps
     power = electric_w(machine_nm[0], 0.5 * (machine + after), limits) + limits.auxiliary_w
-    energy -= step_s * chemical_power_at(power, energy, car.battery)
+    energy -= step_s * chemical_power_at(terminal_w(power, limits), energy, car.battery)
     row[SPEED], row[DISTANCE], row[GEAR], row[ENERGY] = state.speed_mps, distance, gear, energy
     row[SIDE], row[FORCE], row[MACHINE] = state.side_radps, out.force_n, machine_nm[0]
     return Pull(state, lever, gear, launches, closing, gained, distance, energy), out.engine_nm

@@ -90,11 +90,14 @@ def books_of(
     starter = np.maximum(flows["start_w"], 0.0) / car.machines[0].spin_efficiency
     flows["starter_electric_w"] = starter
     electric = flows["machine_electric_w"] + flows["auxiliary_power_w"] + starter
+    terminal = car.terminal_w(electric)
+    if car.converter is not None:
+        flows["converter_loss_w"] = car.converter.loss_w(electric)
     energy_j = trace(
-        start[2], np.zeros(len(record)), electric, np.full(len(record), step_s), car.battery.arrays
+        start[2], np.zeros(len(record)), terminal, np.full(len(record), step_s), car.battery.arrays
     )
-    flows["battery_power_w"] = electric
-    losses = step_flows(car.battery, energy_j[:-1], energy_j[1:], electric, step_s)
+    flows["battery_power_w"] = terminal
+    losses = step_flows(car.battery, energy_j[:-1], energy_j[1:], terminal, step_s)
     flows |= {name: losses[name] for name in ("battery_chemical_w", "battery_loss_w")}
     off_map = np.isnan(flows["fuel_power_w"]) | np.isnan(flows["machine_loss_w"])
     return Books(flows, _residuals(flows), energy_j, off_map)
@@ -210,6 +213,6 @@ def _residuals(f: Mapping[str, Array]) -> dict[str, Array]:
         "road": f["wheel_power_w"] - f["tyre_lag_w"] - f["road_w"] - f["kinetic_w"],
         "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
         "electric bus": f["battery_power_w"] - f["machine_electric_w"] - f["auxiliary_power_w"]
-        - f["starter_electric_w"],
+        - f["starter_electric_w"] - f.get("converter_loss_w", 0.0),
         "battery": f["battery_chemical_w"] - f["battery_power_w"] - f["battery_loss_w"],
     }  # fmt: skip

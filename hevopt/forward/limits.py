@@ -47,9 +47,19 @@ def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> 
         _ENGINE_STEP_RADPS, full, least, load, float(least_w), float(most_w - least_w) / max(rows - 1, 1),
         float(machine_speed[1]), low, high, loss, most, engine.idle_radps, engine.speed_max_radps, own_w,
         machine.spin_efficiency, _braking_share(car), _BRAKING_MPS, _BRAKING_RATE,
+        *_converting(car),
         bool(car.functions & {"e_boost", "nox_cut", "power_management"}),
         "regenerative_braking" in car.functions,
     )  # fmt: skip
+
+
+def _converting(car: Architecture) -> tuple[Array, Array]:
+    """Powers at the bus and shares that pass a converter; empty without one."""
+    if car.converter is None:
+        return np.zeros(0), np.zeros(0)
+    points = car.converter.power_w, car.converter.efficiency
+    power_w, share = (np.ascontiguousarray(values, dtype=np.float64) for values in points)
+    return power_w, share
 
 
 def _braking_share(car: Architecture) -> Array:
@@ -72,9 +82,9 @@ def _allowed(
     torque = limit[:, None] * share
     loss = np.nan_to_num(machine.loss_w(torque, speed[:, None]), nan=np.inf)
     drawn = torque * speed[:, None] + loss
-    power = drawn + loads_w[1]
+    power = car.terminal_w(drawn + loads_w[1])
     least, greatest = power_limits_w(car.battery)
-    inside = (drawn + loads_w[0] >= least) & (power <= greatest) | (share == 0)
+    inside = (car.terminal_w(drawn + loads_w[0]) >= least) & (power <= greatest) | (share == 0)
     high = np.max(np.where(inside, torque, 0.0), axis=1)
     # Beyond the torque of least electric power more braking charges less.
     best = np.argmin(np.where(inside, power, np.inf), axis=1)

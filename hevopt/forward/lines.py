@@ -100,8 +100,6 @@ def _check(car: Architecture) -> None:
         lacking = f"it has {len(line.machines)} machines"
     elif len(_limited(line)) > 1 or any(box.choice == "free" for box in line.boxes):
         lacking = "more than one part follows a choice of its own"
-    elif car.converter is not None:
-        lacking = "a converter stands between its battery and the bus"
     if lacking:
         raise DataError(
             f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "

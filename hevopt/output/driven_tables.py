@@ -29,6 +29,7 @@ SINKS = {
     "gear_loss_w": "machine's gear",
     "machine_loss_w": "machine",
     "battery_loss_w": "battery's loss",
+    "converter_loss_w": "converter",
     "brake_power_w": "brakes",
     "tyre_lag_w": "tyre lag",
     "road_w": "road",
@@ -95,7 +96,9 @@ def audit(run: ForwardRun) -> dict[str, float]:
     found["starter's loss"] = joules("start_w") - joules("starter_electric_w")
     # What is braked at stops comes back out of the shafts as a loss.
     found |= {
-        name: joules(flow) if flow == "stop_w" else -joules(flow) for flow, name in SINKS.items()
+        name: joules(flow) if flow == "stop_w" else -joules(flow)
+        for flow, name in SINKS.items()
+        if flow in flows
     }
     kinetic = joules("kinetic_w") + joules("engine_inertia_w") + joules("machine_inertia_w")
     found["kinetic energy left"] = -kinetic

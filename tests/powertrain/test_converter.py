@@ -6,7 +6,6 @@ from split_cars import short
 
 from hevopt import DataError, build_problem, certify, load_architecture, simulate
 from hevopt.car.storing import storing_kgpj
-from hevopt.forward.lines import line_of
 from hevopt.strategies import dp
 
 CURVE = {"power_w": [0, 4000, 30000], "efficiency": [0.9, 0.96, 0.94]}
@@ -63,11 +62,6 @@ def test_a_converter_of_no_loss_changes_nothing():
 def test_storing_a_joule_takes_what_the_converter_loses_as_well(car):
     behind = with_converter(car, {"efficiency": 0.8})
     assert 0.8 * storing_kgpj(behind) == pytest.approx(storing_kgpj(load_architecture(car)))
-
-
-def test_a_car_driven_forward_has_none():
-    with pytest.raises(DataError, match="a converter stands between its battery and the bus"):
-        line_of(with_converter("C2", {"efficiency": 0.96}))
 
 
 @pytest.mark.parametrize(
