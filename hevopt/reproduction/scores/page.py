@@ -1,18 +1,14 @@
 """The page of benchmarks, Markdown: every figure in it comes from `scored`, none is typed."""
 
-import warnings
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from hevopt.bounds.certificate import certify
 from hevopt.bounds.coarse import COARSE
-from hevopt.errors import CoarseTableWarning
-from hevopt.problem.problem import Problem, Trajectory
-from hevopt.problem.simulation import simulate
+from hevopt.reproduction.scores import highlander_page
 from hevopt.reproduction.scores.analytic import LEVELS, Paper, even_load, on_off
+from hevopt.reproduction.scores.bounds import Score, bound, found
 from hevopt.reproduction.scores.small_hybrid import relaxed_problem, split_problem
 from hevopt.reproduction.verdicts import markdown
-from hevopt.strategies import dp
 
 COMMAND = "hevopt scores --out reports/scores.md"
 SPLITS = (21, 51, 101, 201, 1001)
@@ -20,25 +16,17 @@ CELLS = 2001
 Progress = Callable[[str, int, int], None]
 
 
-class Score(NamedTuple):
-    """What dp burns on a problem, and what is proven of it. coarse: share of the bound that may be missed between
-    controls; None where it is known what lies there"""
-
-    fuel_kg: float
-    bound_kg: float
-    scope: str
-    coarse: float | None
-
-
 class Scored(NamedTuple):
     """All that the page tells. papers: cases with their optimum by hand; splits: number of splits and what was
-    found; all_splits_kg: bound of the small hybrid for every split, made between so many, cells
+    found; all_splits_kg: bound of the small hybrid for every split, made between so many, cells; learnt: what is
+    found on the car of a learning benchmark
     """
 
     papers: Sequence[tuple[Paper, Score]]
     splits: Sequence[tuple[int, Score]]
     all_splits_kg: float
     cells: int
+    learnt: highlander_page.Learnt
 
 
 def scored(progress: Progress, splits: Sequence[int] = SPLITS, cells: int = CELLS) -> Scored:
@@ -48,7 +36,9 @@ def scored(progress: Progress, splits: Sequence[int] = SPLITS, cells: int = CELL
         *(even_load(levels) for levels in LEVELS),
         *(on_off(levels) for levels in LEVELS[:2]),
     ]
-    total = len(papers) + len(splits) + 1
+    alone = len(papers) + len(splits) + 1
+    deciders = [*highlander_page.SOLVERS, *highlander_page.GOALS]
+    total = alone + len(deciders)
     told = []
     for number, paper in enumerate(papers):
         progress(paper.name, number, total)
@@ -57,32 +47,17 @@ def scored(progress: Progress, splits: Sequence[int] = SPLITS, cells: int = CELL
     for number, count in enumerate(splits):
         progress(f"{count} splits", len(papers) + number, total)
         hybrids.append((count, found(split_problem(count))))
-    progress("all splits", total - 1, total)
-    relaxed = relaxed_problem(cells)
-    return Scored(told, hybrids, bound(relaxed)[0], cells)
-
-
-def found(problem: Problem) -> Score:
-    """What dp and the certificate find; where modes are switched, a price alone proves too little, and it may use
-    the plan."""
-    plan = simulate(problem, dp.solve(problem).control)
-    return Score(plan.total_fuel_kg, *bound(problem, plan if problem.table.modes > 1 else None))
-
-
-def bound(problem: Problem, plan: Trajectory | None = None) -> tuple[float, str, float | None]:
-    """The bound at the charge asked, what it speaks of, and the share that may be missed between controls."""
-    with warnings.catch_warnings():
-        # The page tells it.
-        warnings.simplefilter("ignore", CoarseTableWarning)
-        certificate = certify(problem, plan)
-    bound_kg, proof = certificate.bound_kg(problem.end_min_j)
-    coarse = None if certificate.coarse_kg is None else certificate.coarse_kg / bound_kg
-    return bound_kg, str(certificate.claim(proof).scope), coarse
+    progress("all splits", alone - 1, total)
+    least_kg = bound(relaxed_problem(cells))[0]
+    learnt = highlander_page.scored(
+        lambda name: progress(name, alone + deciders.index(name), total)
+    )
+    return Scored(told, hybrids, least_kg, cells, learnt)
 
 
 def page(told: Scored, command: str = COMMAND) -> str:
     """The whole page. command: what makes it"""
-    parts = [_head(command), _papers(told), _hybrid(told)]
+    parts = [_head(command), _papers(told), _hybrid(told), highlander_page.section(told.learnt)]
     return "\n\n".join(parts) + "\n"
 
 
