@@ -126,7 +126,8 @@ def asked_of(
     braking = pedal.force_n < 0.0
     accel = 0.0 if pedal.holds else pedal.accel_mps2 / radius
     wheel_nm = 0.0 if pedal.holds else pedal.force_n * radius
-    return AskedStep(wheel_nm, accel, set_nm, low, high, gives.least_nm, gives.most_nm, braking)
+    return AskedStep(wheel_nm, accel, set_nm, low, high, gives.least_nm, gives.most_nm, braking,
+                     state.lost_nm)  # fmt: skip
 
 
 @compiled(inline="always")
@@ -207,10 +208,10 @@ def split_of(
         set_nm = 0.0 if cut else min(max(asked.set_nm + pace, low), high)
         wheel_nm = asked.wheel_nm + (0.0 if cut else per_nm * pace)
         asked = AskedStep(wheel_nm, asked.accel, set_nm, low, high, asked.least_nm, asked.most_nm,
-                      asked.braking)  # fmt: skip
+                      asked.braking, asked.lost_nm)  # fmt: skip
     friction = _friction_nm(car, asked, state.speed_mps)
     asked = AskedStep(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
-                  asked.least_nm, asked.most_nm, asked.braking)  # fmt: skip
+                  asked.least_nm, asked.most_nm, asked.braking, asked.lost_nm)  # fmt: skip
     closed = joint.closing > 0.0
     split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
                    joint.launches, machine_nm)  # fmt: skip

@@ -39,7 +39,9 @@ ENGINE, MACHINE, CLUTCH, WHEEL, BRAKE, HELD, TYRE, ROAD = range(7, 15)
 # and its driver: force asked for, as numbers of _motor_kernels the engine's phase and why the clutch slips; whether
 # all is given and too little; and the directions in which power passed the joints
 ASKED, PHASE, CAUSE, FULL, VARIANT = range(15, 20)
-COLUMNS = 20
+# Torque lost in a gearbox with a map, at its input.
+LOST = 20
+COLUMNS = 21
 
 
 class Work(NamedTuple):
@@ -89,7 +91,7 @@ def begun(car: LoopCar, task: LoopTask, start_j: float) -> Loop:
     on = task.engine_on[0]
     turns = car.ways.wheel[task.way[0], output] * task.speed_mps[0] / car.body.radius_m
     side = max(car.limits.idle_radps, turns) if on else 0.0
-    state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0)
+    state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0)
     lever, pedal = resting_lever(task.way[0]), PedalState(0.0, 0.0, 0.0, 0.0, True)
     joint = motor.Joined(motor.TURNING if on else motor.REST, 1.0 if side == turns else 0.0, False, 0,
                          car.limits.idle_radps)  # fmt: skip
@@ -144,7 +146,7 @@ def after_step(
     ratio = car.ways.wheel[lever.way, output]
     begins = lever.since_s == 0.0 and lever.blend > 0.0
     neutral = task.apart[d] == 2 or (task.apart[d] == 1 and wish.braking) or pedal.holds
-    need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9)
+    need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9) + state.lost_nm
     joint = motor.joined(joint, phase, lever.gap_s > 0.0 or begins, neutral, wish.braking,
                          ratio * wheel, need, car.limits, car.body.clutch, step_s)  # fmt: skip
     given = split_of(car, rows, state, wish, joint, lever, machine_nm, step_s)
@@ -171,6 +173,7 @@ def after_step(
     row[HELD], row[TYRE], row[ROAD] = out.held_nm, out.force_n, out.road_n
     row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, joint.cause
     row[FULL], row[VARIANT] = 1.0 if given.full else 0.0, state.variant
+    row[LOST] = state.lost_nm
     return Loop(state, pedal, lever, joint, energy, ahead), given.wanted_nm
 
 

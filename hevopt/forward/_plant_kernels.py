@@ -18,12 +18,20 @@ import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.forward._contact_kernels import Body, Pace, grip_n, resistance
-from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, turning
-from hevopt.forward._solve_kernels import Motion, SolvedStep, directions, reached, solve, sums
+from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, lost_nm, turning
+from hevopt.forward._solve_kernels import (
+    Motion,
+    SolvedStep,
+    directions,
+    joint_torque_nm,
+    reached,
+    solve,
+    sums,
+)
 
-# Rounds of guessing the directions of power; each flips those that proved wrong.
-_ROUNDS = 8
-# Share of a speed within which a moving ratio is settled.
+# Rounds of guessing the directions of power, each flipping those that proved wrong, and what a map says is lost.
+_ROUNDS = 12
+# Share of a speed within which a moving ratio is settled, and of a torque within which a map's loss is.
 _SETTLED = 1e-13
 
 
@@ -59,21 +67,23 @@ def step(
     grip = grip_n(passive + along, inputs.slope_rad, body)
     top = max((motion.rest + per_n * of_torque * grip) / own, -wheel)
     governed = np.nan if inputs.governed_radps < 0.0 else inputs.governed_radps - state.side_radps
-    slip = state.side_radps - turning(
+    ratio = turning(
         ways.wheel, inputs.way, inputs.from_way, inputs.blend, len(ways.inertia_kgm2) - 1
-    ) * wheel  # fmt: skip
+    )
+    slip = state.side_radps - ratio * wheel
     moving = state.blend > 0.0 or inputs.blend > 0.0 or state.way != inputs.way
 
     variant, joints = state.variant, ways.load.shape[2]
-    guess_wheel, guess_side = 0.0, 0.0
+    guess_wheel, guess_side, guess_nm = 0.0, 0.0, state.lost_nm
     rest = motion
     for _ in range(_ROUNDS):
+        lost = guess_nm
         if moving:
             fill_row(ways, state, inputs, variant, wheel, wheel + guess_wheel,
                      state.side_radps + guess_side, row)  # fmt: skip
         else:
             row = rows[inputs.way, variant]
-        s = sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s)
+        s = sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s, lost)
         solved = solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                         inputs.capacity_nm)  # fmt: skip
         if solved.wheel > top or solved.wheel < -wheel:
@@ -86,11 +96,15 @@ def step(
                 solved = free
         found = directions(
             row, joints, variant, inputs.machine_nm, solved, wheel + 0.5 * solved.wheel,
-            state.side_radps + 0.5 * solved.side, per_s,
+            state.side_radps + 0.5 * solved.side, per_s, lost,
         )  # fmt: skip
+        if ways.lost.loss_nm.size > 0:
+            through = joint_torque_nm(row, ways.lost.joint, inputs.machine_nm, solved, per_s, 0.0)
+            guess_nm = lost_nm(ways.lost, inputs.way, ratio * (wheel + 0.5 * solved.wheel), through)
         still = abs(solved.wheel - guess_wheel) <= _SETTLED * wheel
         still &= abs(solved.side - guess_side) <= _SETTLED * state.side_radps
-        if found == variant and (still or not moving):
+        still |= not moving
+        if found == variant and still and abs(guess_nm - lost) <= _SETTLED * max(lost, 1.0):
             break
         variant, guess_wheel, guess_side = found, solved.wheel, solved.side
 
@@ -98,13 +112,15 @@ def step(
         s.known + inputs.brake_nm + s.engine * solved.engine_nm + s.clutch * solved.clutch_nm
         - s.per_w * solved.wheel - s.per_n * solved.side
     )  # fmt: skip
-    return _after(body, state, inputs, pace, solved, variant, drive, top, passive, rise, along)
+    return _after(
+        body, state, inputs, pace, solved, variant, lost, drive, top, passive, rise, along
+    )
 
 
 @compiled()
 def _after(
-    body: Body, state: State, inputs: Inputs, pace: Pace, solved: SolvedStep, variant: int, drive: float,
-    top: float, passive: float, rise: float, along: float,
+    body: Body, state: State, inputs: Inputs, pace: Pace, solved: SolvedStep, variant: int, lost: float,
+    drive: float, top: float, passive: float, rise: float, along: float,
 ) -> tuple[State, Outputs]:  # fmt: skip
     """State and outputs; where the wheels' speed is a limit's, brakes or the road take what is over."""
     gained = solved.wheel * body.radius_m
@@ -139,15 +155,10 @@ def _after(
         torque = drive - brake
         force = pace.decay * state.force_n + (1.0 - pace.decay) * torque / body.radius_m
         mean = pace.of_force * state.force_n + of_torque * torque / body.radius_m
+    side = state.side_radps + solved.side
     after = State(
-        speed,
-        force,
-        state.side_radps + solved.side,
-        inputs.way,
-        inputs.from_way,
-        inputs.blend,
-        variant,
-    )
+        speed, force, side, inputs.way, inputs.from_way, inputs.blend, variant, lost
+    )  # fmt: skip
     outputs = Outputs(
         solved.engine_nm, solved.clutch_nm, torque, brake, held, mean, road + along, solved.locked
     )

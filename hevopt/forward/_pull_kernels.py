@@ -86,7 +86,7 @@ def pull_begun(
     turns = max(ratio * speed / car.body.radius_m, car.limits.idle_radps)
     passive, _, along = resistance(speed, 0.0, car.body)
     state = State(speed, 0.0 if launches else passive + along, foot.launch_radps if launches else turns,
-                  way, way, 0.0, 0)  # fmt: skip
+                  way, way, 0.0, 0, 0.0)  # fmt: skip
     return Pull(
         state, resting_lever(way), gear, launches, 0.0 if launches else 1.0, 0.0, 0.0, energy
     )

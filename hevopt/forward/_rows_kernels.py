@@ -27,6 +27,23 @@ JOINT_ENGINE, JOINT_CLUTCH, JOINT_W, JOINT_N, JOINT_MOVED, SENSE_W, SENSE_N = ra
 JOINT_MACHINES = 7
 
 
+class Lost(NamedTuple):
+    """Torque that a gearbox behind the driver's clutch loses at its input, over gear, speed and torque there.
+
+    joint: which of the lossy joints it is; gear: (way,) place of the gear
+    speed_radps: (gear, speed), torque_nm: (gear, torque), rising; loss_nm: (gear, speed, torque), or none
+    """
+
+    joint: int
+    gear: NDArray[np.int64]
+    speed_radps: Array
+    torque_nm: Array
+    loss_nm: Array
+
+
+NO_LOSS = Lost(0, np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)))
+
+
 class Ways(NamedTuple):
     """The driveline as data; units are the engine, the machines, and last the clutch's output.
 
@@ -36,6 +53,7 @@ class Ways(NamedTuple):
     sense: (way, joint, 2) speed that times this torque is the power that enters, per speed of wheels and side
     efficiency: (way, joint)
     inertia_kgm2: (unit,)
+    lost: of a gearbox with a map, whose joint itself loses nothing
     """
 
     wheel: Array
@@ -46,10 +64,14 @@ class Ways(NamedTuple):
     sense: Array
     efficiency: Array
     inertia_kgm2: Array
+    lost: Lost = NO_LOSS
 
 
 class State(NamedTuple):
-    """The car at an instant. Units turn as in `way`, and by the share `blend` still as in `from_way`."""
+    """The car at an instant. Units turn as in `way`, and by the share `blend` still as in `from_way`.
+
+    lost_nm: what a gearbox with a map has lost in the step before, at its input
+    """
 
     speed_mps: float
     force_n: float
@@ -58,6 +80,7 @@ class State(NamedTuple):
     from_way: int
     blend: float
     variant: int
+    lost_nm: float = 0.0
 
 
 class Inputs(NamedTuple):
@@ -79,6 +102,27 @@ class Inputs(NamedTuple):
     way: int
     from_way: int
     blend: float
+
+
+@compiled()
+def _place(axis: Array, at: float) -> tuple[int, float]:
+    """Where a value lies on an axis, held at its ends."""
+    i = min(max(int(np.searchsorted(axis, at, "right")) - 1, 0), len(axis) - 2)
+    return i, min(max((at - axis[i]) / (axis[i + 1] - axis[i]), 0.0), 1.0)
+
+
+@compiled()
+def lost_nm(lost: Lost, way: int, speed_radps: float, torque_nm: float) -> float:
+    """Torque lost at the input of a gearbox with a map; 0 without one."""
+    if lost.loss_nm.size == 0:
+        return 0.0
+    gear = lost.gear[way]
+    i, x = _place(lost.speed_radps[gear], speed_radps)
+    j, y = _place(lost.torque_nm[gear], torque_nm)
+    table = lost.loss_nm[gear]
+    low = table[i, j] * (1.0 - x) + table[i + 1, j] * x
+    high = table[i, j + 1] * (1.0 - x) + table[i + 1, j + 1] * x
+    return float(low + y * (high - low))
 
 
 @compiled()
@@ -157,7 +201,7 @@ def settled_rows(ways: Ways) -> Array:
     count, variants = ways.wheel_yield.shape[:2]
     rows = np.empty((count, variants, row_length(ways)))
     for way in range(count):
-        state = State(0.0, 0.0, 0.0, way, way, 0.0, 0)
+        state = State(0.0, 0.0, 0.0, way, way, 0.0, 0, 0.0)
         inputs = Inputs(rows[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, way, way, 0.0)
         for variant in range(variants):
             fill_row(ways, state, inputs, variant, 0.0, 0.0, 0.0, rows[way, variant])

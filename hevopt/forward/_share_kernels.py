@@ -37,7 +37,7 @@ class AskedStep(NamedTuple):
     """What a step shall do: torque at the wheels and acceleration of the wheels; and what limits it.
 
     set_nm, low_nm, high_nm: the machine's set-point and limits; least_nm, most_nm: the engine's
-    braking: whether the driver brakes
+    braking: whether the driver brakes; lost_nm: in a gearbox with a map, as in the step before
     """
 
     wheel_nm: float
@@ -48,6 +48,7 @@ class AskedStep(NamedTuple):
     least_nm: float
     most_nm: float
     braking: bool
+    lost_nm: float
 
 
 class Meets(NamedTuple):
@@ -59,15 +60,16 @@ class Meets(NamedTuple):
 
 
 @compiled()
-def _meets(row: Array, accel: float, closed: bool) -> Meets:
+def _meets(row: Array, accel: float, lost_nm: float, closed: bool) -> Meets:
+    taken = row[col.CLUTCH] * lost_nm
     wheel_m, side_m = row[col.MACHINES], row[col.MACHINES + 1]
     if not closed:
-        return Meets(-row[col.PER_W] * accel, 0.0, wheel_m)
+        return Meets(-row[col.PER_W] * accel - taken, 0.0, wheel_m)
     side_accel, clutch = row[col.RATIO] * accel, row[col.CLUTCH]
     inertia = row[col.PER_W] * accel + row[col.PER_N] * side_accel
     inertia += clutch * (row[col.SIDE_PER_W] * accel + row[col.SIDE_PER_N] * side_accel)
     return Meets(
-        -inertia, row[col.ENGINE] + clutch * row[col.SIDE_ENGINE], wheel_m + clutch * side_m
+        -inertia - taken, row[col.ENGINE] + clutch * row[col.SIDE_ENGINE], wheel_m + clutch * side_m
     )
 
 
@@ -115,7 +117,7 @@ def shared(
     """Torques of a step; machine_nm: scratch of one value."""
     for _ in range(_TRIES):
         row = rows[way, variant]
-        meets, clutch, engine = _meets(row, asked.accel, closed), 0.0, 0.0
+        meets, clutch, engine = _meets(row, asked.accel, asked.lost_nm, closed), 0.0, 0.0
         wanted = 0.0
         if closed:
             engine, machine, wanted = _closed(asked, meets, limits)
@@ -143,7 +145,7 @@ def shared(
             machine, side_accel = _open(asked, meets, limits), 0.0
         machine_nm[0] = machine
         solved = SolvedStep(asked.accel, side_accel, engine, clutch, closed)
-        found = directions(row, joints, variant, machine_nm, solved, 1.0, 1.0, 1.0)
+        found = directions(row, joints, variant, machine_nm, solved, 1.0, 1.0, 1.0, asked.lost_nm)
         if found == variant:
             break
         variant = found

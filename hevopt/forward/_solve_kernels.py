@@ -54,8 +54,12 @@ class SolvedStep(NamedTuple):
 
 
 @compiled()
-def sums(row: Array, machine_nm: Array, brake_nm: float, slip: float, per_s: float) -> Sums:
-    known, side_known = -row[col.MOVED] * per_s - brake_nm, -row[col.SIDE_MOVED] * per_s
+def sums(
+    row: Array, machine_nm: Array, brake_nm: float, slip: float, per_s: float, lost_nm: float
+) -> Sums:
+    """lost_nm: in a gearbox with a map, at the clutch's output."""
+    known = -row[col.MOVED] * per_s - brake_nm - row[col.CLUTCH] * lost_nm
+    side_known = -row[col.SIDE_MOVED] * per_s
     for m in range(len(machine_nm)):
         at = col.MACHINES + col.PER_MACHINE * m
         known += row[at] * machine_nm[m]
@@ -156,17 +160,16 @@ def solve(
 
 @compiled()
 def joint_torque_nm(
-    row: Array, joint: int, machine_nm: Array, solved: SolvedStep, per_s: float
+    row: Array, joint: int, machine_nm: Array, solved: SolvedStep, per_s: float, lost_nm: float
 ) -> float:
-    """Torque that enters a lossy joint."""
+    """Torque that enters a lossy joint, with what is lost at the clutch's output; nothing for what enters there."""
     at = (
         col.MACHINES
         + col.PER_MACHINE * len(machine_nm)
         + (col.JOINT_MACHINES + len(machine_nm)) * joint
     )
-    torque = (
-        row[at + col.JOINT_ENGINE] * solved.engine_nm
-        + row[at + col.JOINT_CLUTCH] * solved.clutch_nm
+    torque = row[at + col.JOINT_ENGINE] * solved.engine_nm + row[at + col.JOINT_CLUTCH] * (
+        solved.clutch_nm - lost_nm
     )
     torque -= per_s * (
         row[at + col.JOINT_W] * solved.wheel
@@ -188,6 +191,7 @@ def directions(
     mean_wheel: float,
     mean_side: float,
     per_s: float,
+    lost_nm: float,
 ) -> int:
     """The variant of a solution that was made with one; where power is rounding, the one it was made with."""
     found = 0
@@ -198,7 +202,7 @@ def directions(
             + (col.JOINT_MACHINES + len(machine_nm)) * j
         )
         through = row[at + col.SENSE_W] * mean_wheel + row[at + col.SENSE_N] * mean_side
-        power = joint_torque_nm(row, j, machine_nm, solved, per_s) * through
+        power = joint_torque_nm(row, j, machine_nm, solved, per_s, lost_nm) * through
         if power < -_TINY_W or (power <= _TINY_W and variant >> j & 1):
             found |= 1 << j
     return found

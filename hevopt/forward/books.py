@@ -100,6 +100,7 @@ def books_of(
     losses = step_flows(car.battery, energy_j[:-1], energy_j[1:], terminal, step_s)
     flows |= {name: losses[name] for name in ("battery_chemical_w", "battery_loss_w")}
     off_map = np.isnan(flows["fuel_power_w"]) | np.isnan(flows["machine_loss_w"])
+    off_map |= _off_gearbox(car, line, record, turning, step_s)
     return Books(flows, _residuals(flows), energy_j, off_map)
 
 
@@ -154,8 +155,8 @@ def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[
     """
     ways, way = line.ways, record[:, col.WAY].astype(np.int64)
     variant = record[:, col.VARIANT].astype(np.int64)
-    applied = np.stack([record[:, col.ENGINE], record[:, col.MACHINE], record[:, col.CLUTCH]])
-    applied -= ways.inertia_kgm2[:, None] * np.diff(turning.units, axis=1) / step_s
+    applied = _applied(line, record, turning, step_s)
+    applied[-1] -= record[:, col.LOST]
     power = applied * turning.mean(turning.by_wheel)
     settled = ways.wheel[way]
     per_wheel = np.divide(1.0, settled, out=np.zeros_like(settled), where=settled != 0)
@@ -165,7 +166,30 @@ def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[
         entering, eta = np.einsum("nu,un->n", share, power), ways.efficiency[way, j]
         backward = (variant >> j & 1).astype(bool)
         result[f"{name}_loss_w"] += entering * np.where(backward, 1 - 1 / eta, 1 - eta)
+    result["gearbox_loss_w"] += record[:, col.LOST] * turning.mean(turning.by_wheel[-1])
     return result
+
+
+def _applied(line: Line, record: Array, turning: Turning, step_s: float) -> Array:
+    """(unit, step) torques on the units, less what their own inertia takes."""
+    applied = np.stack([record[:, col.ENGINE], record[:, col.MACHINE], record[:, col.CLUTCH]])
+    inertia = line.ways.inertia_kgm2[:, None]
+    less: Array = applied - inertia * np.diff(turning.units, axis=1) / step_s
+    return less
+
+
+def _off_gearbox(
+    car: Architecture, line: Line, record: Array, turning: Turning, step_s: float
+) -> Flags:
+    """(step,) where a gearbox with a map has no data for what enters it."""
+    loss, ways = None if car.gearbox is None else car.gearbox.loss, line.ways
+    if loss is None:
+        return np.zeros(len(record), dtype=bool)
+    way, variant = (record[:, c].astype(np.int64) for c in (col.WAY, col.VARIANT))
+    per_unit = ways.load[way, variant, ways.lost.joint]
+    entering = np.einsum("nu,un->n", per_unit, _applied(line, record, turning, step_s))
+    speed = turning.mean(turning.by_wheel[-1])
+    return loss.unknown(line.gears[way], speed, entering[:, None])[:, 0]
 
 
 def _breath(flows: Mapping[str, Array], breath: Array) -> dict[str, Array]:

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.gear_loss import loss_at
 from hevopt.car.handling import Handling
 from hevopt.display.facts import Shown
 from hevopt.forward._acting_kernels import LoopCar
@@ -60,6 +61,11 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
         on_side = full + ways.side[way, 1] * machine
         torque = ratio * ways.wheel_yield[way, 0, -1] * on_side
         torque += ways.wheel[way, 1] * ways.wheel_yield[way, 0, 1] * machine
+        if line.mapped:
+            of_clutch, of_machine = ways.load[way, 0, ways.lost.joint, [-1, 1]]
+            through = of_clutch * on_side + of_machine * machine
+            lost = lost_at(car, line.keys[way][0], ratio * wheel, through)
+            torque -= ratio * ways.wheel_yield[way, 0, -1] * lost
         known = (side >= limits.idle_radps) & (side <= limits.engine_max_radps)
         forces.append(np.where(known, torque / radius, np.nan))
     powers = speed ** np.arange(4)[:, None]
@@ -67,6 +73,15 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     tyre = driven.body.tyre
     grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
     return Curves(speed, np.array(forces), resistance, float(grip))
+
+
+def lost_at(car: Architecture, gear: int, speed_radps: Array, torque_nm: Array) -> Array:
+    """(state,) torque that the car's gearbox loses at its input by a map; 0 without one."""
+    loss = None if car.gearbox is None else car.gearbox.loss
+    if loss is None:
+        return np.zeros_like(torque_nm)
+    knots = loss.knots(np.full(len(torque_nm), gear), speed_radps)
+    return loss_at(*knots, torque_nm[:, None])[:, 0]
 
 
 def tabulated(values: Array, step: float, speed: float | Array) -> Array:
@@ -105,6 +120,7 @@ def start_slope(car: Architecture, driven: LoopCar, handling: Handling, curves: 
     launch = LAUNCH_RPM / RPM_PER_RADPS
     full = float(tabulated(limits.full_nm, limits.engine_step, launch))
     passed = min(full, handling.clutch.slipping_nm)
+    passed -= float(lost_at(car, 1, np.zeros(1), np.array([passed]))[0])
     force = ways.wheel[0, -1] * ways.wheel_yield[0, 0, -1] * passed / driven.body.radius_m
     spare = force - driven.body.rolling_n[0]
     return _tangent(spare / (car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2), handling)

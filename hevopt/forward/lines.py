@@ -19,7 +19,7 @@ from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Joint
 from hevopt.car.ways import Way, way
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.forward._rows_kernels import Ways
+from hevopt.forward._rows_kernels import NO_LOSS, Lost, Ways
 
 _NET = "net torque on "
 _OUTPUT = "clutch's output"
@@ -51,6 +51,11 @@ class Line(Shown):
         return min(fits, key=lambda n: (abs(self.keys[n][0] - gear), self.keys[n][0]))
 
     @property
+    def mapped(self) -> bool:
+        """Whether its gearbox's losses are in a map."""
+        return self.ways.lost.loss_nm.size > 0
+
+    @property
     def gears(self) -> np.ndarray:
         """(way,) the listed gear."""
         return np.array([gear for gear, _, _ in self.keys])
@@ -70,7 +75,7 @@ def line_of(car: Architecture) -> Line:
         np.zeros((count, units)), np.zeros((count, units)),
         np.ones((count, variants, units)), np.ones((count, variants, units)),
         np.zeros((count, variants, len(lossy), units)), np.zeros((count, len(lossy), 2)),
-        np.ones((count, len(lossy))), np.array(inertia),
+        np.ones((count, len(lossy))), np.array(inertia), _lost(line, lossy, keys),
     )  # fmt: skip
     for n, key in enumerate(keys):
         _fill(ways, n, _way(line, key), joints[key], tuple(lossy), (ENGINE, *machines), key[0])
@@ -92,12 +97,15 @@ def _check(car: Architecture) -> None:
         lacking = "its engine is behind no driver's clutch and gears"
     elif line.free_engine_speed:
         lacking = "its engine's speed is free"
-    elif car.gearbox is not None and car.gearbox.loss is not None:
-        lacking = "its gearbox has a loss_map, and the driven car one efficiency a gear"
     elif odd:
         lacking = f"the strategy moves {', '.join(odd)}"
     elif len(line.machines) != 1:
         lacking = f"it has {len(line.machines)} machines"
+    elif (mapped := _mapped(line)) and (
+        len(line.boxes) > 1
+        or mapped[0].first not in {s for c in line.driver_clutches for s in c.shafts}
+    ):
+        lacking = "a loss_map is of more than one gearbox, or of one that is not behind the driver's clutch"
     elif len(_limited(line)) > 1 or any(box.choice == "free" for box in line.boxes):
         lacking = "more than one part follows a choice of its own"
     if lacking:
@@ -105,6 +113,10 @@ def _check(car: Architecture) -> None:
             f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "
             "machine, and no engine or one behind a driver's clutch and gears, can; `hevopt run` solves it backward"
         )
+
+
+def _mapped(line: Driveline) -> list[Gearbox]:
+    return [box for box in line.boxes if box.loss is not None]
 
 
 def _limited(line: Driveline) -> list[Gear]:
@@ -136,7 +148,33 @@ def _lossy(joints: object) -> dict[str, str]:
     """Joint with loss -> what the loss is called, of all ways."""
     found: dict[str, str] = {}
     for of_way in joints:  # type: ignore[attr-defined]
-        found |= {joint.name: joint.loss for joint in of_way if not joint.lossless}
+        found |= {j.name: j.loss for j in of_way if not j.lossless or j.lost is not None}
+    return found
+
+
+def _lost(line: Driveline, lossy: dict[str, str], keys: list[Key]) -> Lost:
+    """The map of a gearbox that has one, every gear's as wide as the widest, going on as its own ends."""
+    boxes = _mapped(line)
+    if not boxes:
+        return NO_LOSS
+    loss = boxes[0].loss
+    assert loss is not None  # as of _mapped
+    speeds, torques = (
+        max(len(axis) for axis in axes)
+        for axes in zip(*((g.speed_radps, g.torque_nm) for g in loss.gears), strict=True)
+    )
+    shape = len(loss.gears), speeds, torques
+    found = Lost(list(lossy).index(boxes[0].name), np.array([gear - 1 for gear, _, _ in keys], dtype=np.int64),
+                 np.zeros(shape[:2]), np.zeros((shape[0], shape[2])), np.zeros(shape))  # fmt: skip
+    for n, gear in enumerate(loss.gears):
+        over = speeds - len(gear.speed_radps), torques - len(gear.torque_nm)
+        found.speed_radps[n] = np.append(
+            gear.speed_radps, gear.speed_radps[-1] + np.arange(1, over[0] + 1)
+        )
+        found.torque_nm[n] = np.append(
+            gear.torque_nm, gear.torque_nm[-1] + np.arange(1, over[1] + 1)
+        )
+        found.loss_nm[n] = np.pad(gear.filled(), ((0, over[0]), (0, over[1])), "edge")
     return found
 
 

@@ -220,8 +220,12 @@ def _torque_before(floored: _Floored, speed_mps: float, place: int) -> float:
     )  # fmt: skip
     through = ways.wheel[way, -1] * ways.wheel_yield[way, 0, -1] / body.radius_m
     torque = float(resistance(speed_mps, 0.0, body)[0] / through)
+    side = ways.wheel[way, -1] * speed_mps / body.radius_m
+    gearbox = floored.car.gearbox
+    if gearbox is not None and gearbox.loss is not None:
+        state = np.array([place + 1]), np.array([side]), np.array([torque])
+        torque = float(gearbox.loss.input_nm(*state)[0])
     if len(limits.load_nm):
-        side = ways.wheel[way, -1] * speed_mps / body.radius_m
         torque -= ways.side[way, 1] * float(tabulated(limits.load_nm[0], limits.engine_step, side))
     return torque
 

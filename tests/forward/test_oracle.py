@@ -85,7 +85,7 @@ def test_a_launch_and_a_change_of_gear_agree_with_solve_ivp():
     gears[1].wheel[:, -1] = gears[1].sense[:, :, 0] = RATIOS[1]
     inertia = gears[0].inertia_kgm2
     ways = Ways(
-        *(np.concatenate(parts) for parts in zip(*(g[:-1] for g in gears), strict=True)), inertia
+        *(np.concatenate(parts) for parts in zip(*(g[:7] for g in gears), strict=True)), inertia
     )
     car = body((R0_N, 0, 0, 0), (0, 0, R2, 0), lag_s=LAG_S)._replace(equivalent_kg=MASS_KG)
 

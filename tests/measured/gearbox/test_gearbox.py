@@ -197,8 +197,8 @@ def test_what_lies_outside_the_map_is_rejected_and_said(hevopt, folder, beginnin
 
 def test_what_cannot_count_with_a_map_says_so(hevopt, folder):
     box = flat_map(0.95)
-    seen = hevopt("drive", "C2", "--set", f'gearbox="{box}"')
-    assert seen.status == 2 and "gearbox has a loss_map" in seen.err, seen.err
+    seen = hevopt("drive", "E", "--set", f'gearbox="{box}"')
+    assert seen.status == 2 and "loss_map is of more than one gearbox" in seen.err, seen.err
     seen = hevopt("tipin", "compact_1300", "--set", f'gearbox="{box}"')
     assert seen.status == 2 and "gearbox has a loss_map" in seen.err, seen.err
 
