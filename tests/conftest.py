@@ -4,6 +4,7 @@ from functools import cache
 
 import pytest
 from command_line import call
+from slow import slow
 
 ARCHITECTURES = ("A", "B", "C1", "C2", "D", "E")
 HYBRIDS = ("C1", "C2", "D", "E")
@@ -19,11 +20,16 @@ FIRST = (
 )  # fmt: skip
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are left out by their marks
 def pytest_collection_modifyitems(items):
     def place(item):
         name = item.nodeid.removeprefix("tests/")
         return next((n for n, start in enumerate(FIRST) if name.startswith(start)), len(FIRST))
 
+    listed = slow()
+    for item in items:
+        if item.nodeid.removeprefix("tests/").split("[")[0] in listed:
+            item.add_marker("slow")
     items.sort(key=place)
 
 

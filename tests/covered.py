@@ -24,7 +24,7 @@ TESTS = [
     "tests/strategies/test_value_blocks.py",
 ]
 RUNS = [
-    ["-m", "pytest", "-n", "0", *TESTS],
+    ["-m", "pytest", "-n", "0", "-m", "not long", *TESTS],
     ["tests/proofs/run.py", "--count", "200", "--nodes", "61"],
 ]
 

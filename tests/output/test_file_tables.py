@@ -169,7 +169,7 @@ def test_a_wrong_output_is_one_message_before_anything_is_solved(hevopt, words, 
     def forbidden(*_, **__):
         pytest.fail("a case was prepared")
 
-    from hevopt.studies import comparison as study
+    from hevopt.studies import by_car as study
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "prepare", forbidden)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hevopt import DataError, build_problem, drive, load_architecture, load_cycle, simulate, solve
+from hevopt import DataError, build_problem, load_architecture, load_cycle, simulate, solve
 from hevopt.driving.cycle import cycle_of
 
 NEDC = load_cycle("nedc")
@@ -66,10 +66,3 @@ def test_a_wrong_load_is_a_message_with_its_line(tmp_path, cell, words):
     with pytest.raises(DataError, match="line 3") as found:
         cycle_of(tmp_path / "own.csv", text)
     assert words in str(found.value)
-
-
-def test_it_is_not_driven_forward_yet():
-    with pytest.raises(DataError, match="auxiliary_power_w cannot be driven forward"):
-        drive(C2, with_load(100.0))
-    with pytest.raises(DataError, match="its electric load depends on the engine"):
-        drive(load_architecture("C2", {"car.auxiliary_off_power_w": 40.0}), PART)
