@@ -2,9 +2,10 @@
 
 Its reward of a second is minus the energy of the fuel, that of the second before, and of the charge taken, a kWh of
 charge counted like one of fuel; over a drive that begins and ends at rest, minus the sum of both. At or below a
-charge of 0.6 its step ignores the action and sets the machine to the power of the auxiliaries. The best such agent
-is a backward recursion over charge, without the engine's ramp; it then drives in its step, with the ramp, each
-second by the action of the most reward and the most to come.
+charge of 0.6 its step ignores the action and sets the machine to the power of the auxiliaries. Near the best such
+agent is a backward recursion over charge, without the engine's ramp and with values straight between charges, which
+the jump at the lock is not; it then drives in its step, with the ramp, each second by the action of the most reward
+and the most to come.
 """
 
 from typing import NamedTuple
@@ -15,8 +16,8 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.reproduction.scores import highlander as car
 from hevopt.reproduction.scores import highlander_data as data
 
-# Charges of the recursion: every 0.0005, 0.6 among them, over the band in which the step is that of the table.
-_SOCS = np.arange(962, 1401) / 2000
+# Charges of the recursion: every 0.0001, 0.6 among them, over the band in which the step is that of the table.
+_SOCS = np.arange(4810, 7001) / 10_000
 # Of a kWh of charge: less is no use at the end (`keeps`), and beyond the band there is no way.
 _MISSING, _BEYOND = 10.0, 1e3
 
@@ -43,7 +44,7 @@ class AgentDrive(NamedTuple):
 
 
 def driven(goal: AgentGoal, count: int) -> AgentDrive:
-    """UDDS by the best agent of a goal, with so many of the 2000 actions."""
+    """UDDS by the agent of a goal, with so many of the 2000 actions."""
     asked, actions = car.asked(), car.actions(count)
     to_go = _to_go_kwh(goal, actions)
     steps = len(asked.power_kw)

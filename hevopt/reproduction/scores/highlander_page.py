@@ -24,7 +24,7 @@ SOLVERS: dict[str, Callable[[Problem], Plan]] = {
     "power_follower": power_follower.solve,
     "a_ecms": a_ecms.solve,
 }
-_BEST, _KEEPS, _FREE = "its reward, its lock", "least fuel, its lock", "its reward, no lock"
+_BEST, _KEEPS, _FREE = "its reward, its lock", "fuel alone, its lock", "its reward, no lock"
 GOALS = {
     _BEST: AgentGoal(True, False),
     _KEEPS: AgentGoal(True, True),
@@ -121,15 +121,15 @@ the end.
 **What its reward and its lock cost an agent.** The reward counts a kWh of charge like one of fuel, but it saves
 {told.saved():.1f} of fuel: followed to the letter without the lock it empties the battery, here to the end of the
 band, and leaves {100 * free.below:.2f} % to gain at an end charge of {free.soc_end:.3f}. So a lock takes the action
-away at and below {data.LOCK_SOC:g}, where the drive also begins. With it the best agent of that reward ends at
+away at and below {data.LOCK_SOC:g}, where the drive also begins. With it an agent of that reward ends at
 {best.soc_end:.3f} and leaves {100 * best.below:.2f} %; one of the same lock that wants the least fuel and at least
-the charge of the start leaves {100 * kept.below:.2f} %: the lock costs that, the reward under it no more. What an
-agent burns beyond it has not been learnt; what one saves beyond it is not at equal charge."""
+the charge of the start leaves {100 * kept.below:.2f} %: most of what either leaves is the lock's. These agents know
+the whole cycle, by a recursion over charge: near the best of their kind, not proven to be it."""
 
 
 def _line(row: DecidedRow, bound_kg: float) -> tuple[str, ...]:
     equal_kg = row.fuel_kg + bound_kg - row.bound_kg
-    name = row.name if row.name in SOLVERS else f"best agent: {row.name}"
+    name = row.name if row.name in SOLVERS else f"agent: {row.name}"
     return (
         name,
         f"{row.fuel_kg * 1e3:.2f}",

@@ -150,7 +150,7 @@ def _plan(problem, seed):
 
 @pytest.fixture(scope="module")
 def drives():
-    """Best agents of the reward, with its lock and without, of few actions."""
+    """Agents of the reward, with its lock and without, of few actions."""
     return {
         locked: agent.driven(agent.AgentGoal(locked, keeps=False), 7) for locked in (True, False)
     }
