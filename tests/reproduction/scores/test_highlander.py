@@ -150,10 +150,10 @@ def _plan(problem, seed):
 
 @pytest.fixture(scope="module")
 def drives():
-    """Agents of the reward, with its lock and without, of few actions."""
-    return {
-        locked: agent.driven(agent.AgentGoal(locked, keeps=False), 7) for locked in (True, False)
-    }
+    """Agents of the reward, with its lock and without, of few actions and of every tenth charge."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(agent, "_SOCS", agent._SOCS[::10])
+        return {lock: agent.driven(agent.AgentGoal(lock, keeps=False), 7) for lock in (True, False)}
 
 
 @pytest.mark.parametrize("locked", [True, False])
