@@ -28,7 +28,8 @@ def pytest_collection_modifyitems(items):
 
     listed = slow()
     for item in items:
-        if item.nodeid.removeprefix("tests/").split("[")[0] in listed:
+        name = item.nodeid.removeprefix("tests/").split("[")[0]
+        if name in listed or name.split("::")[0] in listed:
             item.add_marker("slow")
     items.sort(key=place)
 

@@ -1,8 +1,9 @@
-"""Which tests take long enough to have a tier of their own: python tests/slow.py LOG
+"""Which tests take long enough to have a tier of their own: python tests/slow.py LOG [LOG ...]
 
 Reads what `pytest -m "not long" --durations=0 --durations-min=0.1 > LOG` printed and writes to tests/slow.txt the
-functions that took more than two seconds together, with what is set up for them. The default command leaves them
-out; `pytest -m slow` runs them, and so does `.ci/run`.
+functions that took more than two seconds together, and the files in which setting up took as much, as whoever of
+them comes first would pay for it. The default command leaves them out; `pytest -m slow` runs them, and so does
+`.ci/run`.
 """
 
 import re
@@ -19,11 +20,11 @@ _ALWAYS = (
     "test_readme.py",
     "test_docs.py::test_the_site_builds",
 )
-_LINE = re.compile(r"([\d.]+)s (?:call|setup|teardown) +tests/(\S+?::\w+)")
+_LINE = re.compile(r"([\d.]+)s (call|setup|teardown) +tests/(\S+?)(::\w+)")
 
 
 def slow() -> frozenset[str]:
-    """Functions of the slow tier, as FILE::FUNCTION below tests/."""
+    """What is in the slow tier: files below tests/, and functions as FILE::FUNCTION."""
     return frozenset(LISTED.read_text().split())
 
 
@@ -32,11 +33,16 @@ def measured(log: str) -> list[str]:
     seconds: dict[str, float] = defaultdict(float)
     for line in log.splitlines():
         if found := _LINE.match(line):
-            seconds[found[2]] += float(found[1])
+            taken, phase, path, function = found.groups()
+            seconds[path if phase == "setup" else path + function] += float(taken)
+    dear = {name for name, taken in seconds.items() if taken > _SECONDS}
     return sorted(
-        name for name, taken in seconds.items() if taken > _SECONDS and not name.startswith(_ALWAYS)
+        name
+        for name in dear
+        if not name.startswith(_ALWAYS) and (name.split("::")[0] not in dear or "::" not in name)
     )
 
 
 if __name__ == "__main__":
-    LISTED.write_text("\n".join(measured(Path(sys.argv[1]).read_text())) + "\n")
+    logs = "".join(Path(log).read_text() for log in sys.argv[1:])
+    LISTED.write_text("\n".join(measured(logs)) + "\n")
