@@ -5,7 +5,7 @@ import io
 import json
 import re
 from dataclasses import fields
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pytest
@@ -371,9 +371,9 @@ def test_of_many_designs_the_front_and_the_best_are_always_drawn(monkeypatch):
 @pytest.mark.long
 def test_a_hundred_thousand_cases_make_a_page_of_less_than_12_mb_in_less_than_10_s():
     records = list(many(100_000))
-    began = perf_counter()
+    began = process_time()
     page = sweep_page(sweep_of(records))
-    assert perf_counter() - began < 10
+    assert process_time() - began < 10
     assert len(page.encode()) < 12e6
 
 
