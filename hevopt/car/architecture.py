@@ -89,6 +89,12 @@ class Architecture(Shown):
         """Power at the battery's terminals for one at the electric bus, > 0 out of the battery."""
         return bus_w if self.converter is None else self.converter.terminal_w(bus_w)
 
+    def of_mass(self, mass_kg: float) -> "Architecture":
+        """The same car of another mass, its rolling resistance in proportion."""
+        vehicle = self.vehicle
+        r0, r1, r2, r3 = (mass_kg / vehicle.mass_kg * r for r in vehicle.rolling_n)
+        return replace(self, vehicle=replace(vehicle, mass_kg=mass_kg, rolling_n=(r0, r1, r2, r3)))
+
     @property
     def shift_gap_s(self) -> float:
         """The gap of the gearbox's file; none where each half of the gears has a clutch of its own."""

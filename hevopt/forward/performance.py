@@ -1,7 +1,7 @@
 """How fast a car is: full pedal from rest and in each gear, top speed, slopes, and the forces behind them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -122,7 +122,7 @@ def performance(
     """
     handling = handling or car.handling
     _check(car, boosts or fills, added_kg, boost_lag_s, handling, engine_model)
-    loaded, line = _loaded(car, added_kg), line_of(car)
+    loaded, line = car.of_mass(car.vehicle.mass_kg + added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
     driven = loop_car(loaded, line, handling._replace(shifting=shifting))
     foot = _foot(car, boosts, fills, boost_lag_s)
@@ -159,14 +159,6 @@ def _foot(car: Architecture, boosts: bool, fills: bool, boost_lag_s: float) -> F
     return Foot(
         launch / RPM_PER_RADPS, up / RPM_PER_RADPS, helps, fills, float(boost_lag_s), _NATURAL_SHARE
     )
-
-
-def _loaded(car: Architecture, added_kg: float) -> Architecture:
-    """The car with people and load, under which its tyres roll harder in proportion to the weight."""
-    vehicle = car.vehicle
-    mass_kg = vehicle.mass_kg + added_kg
-    r0, r1, r2, r3 = (mass_kg / vehicle.mass_kg * r for r in vehicle.rolling_n)
-    return replace(car, vehicle=replace(vehicle, mass_kg=mass_kg, rolling_n=(r0, r1, r2, r3)))
 
 
 def _check(

@@ -4,7 +4,7 @@ A trailer adds mass and its rolling resistance, not the car's load on the driven
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -133,13 +133,10 @@ def price_of(car: Architecture) -> float:
 
 
 def _driven(car: Architecture, boost: bool, added_kg: float, trailer_kg: float) -> Performance:
-    vehicle = car.vehicle
-    own_kg, all_kg = vehicle.mass_kg + added_kg, vehicle.mass_kg + added_kg + trailer_kg
-    r0, r1, r2, r3 = (all_kg / vehicle.mass_kg * r for r in vehicle.rolling_n)
-    tyre = car.handling.tyre
+    own_kg = car.vehicle.mass_kg + added_kg
+    all_kg, tyre = own_kg + trailer_kg, car.handling.tyre
     tyre = tyre._replace(driven_share=tyre.driven_share * own_kg / all_kg)
-    loaded = replace(car, vehicle=replace(vehicle, mass_kg=all_kg, rolling_n=(r0, r1, r2, r3)))
-    return performance(loaded, boosts=boost, handling=car.handling._replace(tyre=tyre))
+    return performance(car.of_mass(all_kg), boosts=boost, handling=car.handling._replace(tyre=tyre))
 
 
 def _figure(run: Performance, file: RequirementFile) -> float | None:

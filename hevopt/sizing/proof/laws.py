@@ -88,7 +88,7 @@ def laws_of(
     """
     check_car(car)
     mass, mass0 = _masses(cars, car, low, high)
-    ends = [car_of_mass(car, float(mass0 + mass @ corner)) for corner in (low, high)]
+    ends = [car.of_mass(float(mass0 + mass @ corner)) for corner in (low, high)]
     heavy = {corner: demand_of(cycle, of.vehicle, of.gearbox) for corner, of in cars.items()}
     if cycle.gear is None:
         raise NotProvable(f"{cycle.name}: no proof over ranges on a cycle without listed gears")
@@ -111,13 +111,6 @@ def laws_of(
         car, demand.step_s, (modes[0], modes[1]), static, loss.c3, car.vehicle.auxiliary_power_w,
         kg, joule, mass0, mass,
     )  # fmt: skip
-
-
-def car_of_mass(car: Architecture, mass_kg: float) -> Architecture:
-    """The same car of another mass, with its rolling resistance."""
-    vehicle = car.vehicle
-    r0, r1, r2, r3 = (mass_kg / vehicle.mass_kg * r for r in vehicle.rolling_n)
-    return replace(car, vehicle=replace(vehicle, mass_kg=mass_kg, rolling_n=(r0, r1, r2, r3)))
 
 
 def corners_of(sizes: int) -> list[tuple[int, ...]]:
