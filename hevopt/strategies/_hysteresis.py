@@ -1,16 +1,16 @@
 """What rules share that start the engine above a power and stop it below another: calibration, and the stepper."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from hevopt.errors import InfeasibleError
 from hevopt.problem.arrays import Array
-from hevopt.problem.problem import Plan
+from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _hysteresis_kernels as kernels
 from hevopt.strategies._rule_kernels import at_rest
-from hevopt.strategies._rules import Rules, corrected_kg, eligible
+from hevopt.strategies._rules import Rules, corrected_kg, eligible, rules_of
 
 
 class HysteresisStepper:
@@ -32,6 +32,13 @@ class HysteresisStepper:
             self.rule, self.limits, k, energy_j, mode, self._on, choices
         )
         return int(choices.control[entry])
+
+    def on(
+        self, points: Problem, rule_of: Callable[[Rules], kernels.HysteresisRule]
+    ) -> "HysteresisStepper":
+        """The same limits on operating points, whose rule is made anew: any of them, however often."""
+        rules = rules_of(points, self.rules)
+        return HysteresisStepper(rules, rule_of(rules), self.limits, self.notes)
 
     def plan(self) -> Plan:
         """What it does on its own problem from start to end."""

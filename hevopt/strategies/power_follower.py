@@ -49,9 +49,7 @@ def start(problem: Problem) -> HysteresisStepper:
 
 def start_on(problem: Problem, points: Problem, interval_s: float) -> HysteresisStepper:
     """The member that suits the problem best, on operating points: any of them, however often."""
-    of = start(problem)
-    rules = rules_of(points, of.rules)
-    return HysteresisStepper(rules, _rule_of(rules), of.limits, of.notes)
+    return start(problem).on(points, _rule_of)
 
 
 def solve(problem: Problem) -> Plan:
@@ -82,16 +80,10 @@ def _members(rules: Rules, half_j: float) -> Array:
     if given.charge_power_w is not None:
         charge_w = [given.charge_power_w]
     off_w = given.engine_off_power_w
-    return np.array(
-        [
-            (charge / half_j, reference_j, *_on_off(on, off_w, share))
-            for on, share, charge in product(on_w, _OFF_SHARES, charge_w)
-        ]
-    )
-
-
-def _on_off(on_w: float, off_w: float | None, share: float) -> tuple[float, float]:
-    """Starting power and stopping power, the first never the lower one."""
     if off_w is None:
-        return on_w, min(share * on_w, on_w)
-    return max(on_w, off_w), off_w
+        on_off = [(on, min(share * on, on)) for on in on_w for share in _OFF_SHARES]
+    else:
+        on_off = [(max(on, off_w), off_w) for on in on_w]
+    return np.array(
+        [(charge / half_j, reference_j, on, off) for (on, off), charge in product(on_off, charge_w)]
+    )

@@ -37,9 +37,7 @@ def start(problem: Problem) -> HysteresisStepper:
 
 def start_on(problem: Problem, points: Problem, interval_s: float) -> HysteresisStepper:
     """The member that suits the problem best, on operating points: any of them, however often."""
-    of = start(problem)
-    rules = rules_of(points, of.rules)
-    return HysteresisStepper(rules, _rule_of(rules), of.limits, of.notes)
+    return start(problem).on(points, _rule_of)
 
 
 def solve(problem: Problem) -> Plan:
