@@ -59,7 +59,6 @@ class ComparisonJob:
     def about(self) -> dict[str, Any]:
         """What a result comes from: digests of the files read, versions, and the settings made; and what the rows
         solved so far burn from a cold start, where that is asked for."""
-        from hevopt.output.cold_tables import cold_contents
         from hevopt.studies.provenance import changes_shown, digests_shown, versions
 
         return {
@@ -70,8 +69,15 @@ class ComparisonJob:
                 "changes": changes_shown(self.cars.changes),
                 "left_out": self.cars.left_out,
             },
-            **({} if self.cold is None else {"cold_start": cold_contents(self.cold)}),
+            **self._cold_contents(),
         }
+
+    def _cold_contents(self) -> dict[str, Any]:
+        if self.cold is None:
+            return {}
+        from hevopt.output.cold_tables import cold_contents
+
+        return {"cold_start": cold_contents(self.cold)}
 
     @cached_property
     def is_study(self) -> bool:
@@ -87,7 +93,7 @@ class Files:
 
     out: rows; steps: every step of every row; page, save: the report and what it is made from, with fronts and
     effects (sensitivities) of every car where asked for; proofs: the folder that every row's bound goes to
-    nox_limit: what the page draws a line at, mg/km; cold: takes what rows burn from a cold start
+    nox_limit: what the page draws a line at, mg/km
     """
 
     out: Path | None
@@ -98,7 +104,6 @@ class Files:
     fronts: bool
     effects: bool
     nox_limit: float | None = None
-    cold: "ColdStarts | None" = None
     _collector: "Collector | None" = field(default=None, init=False)
     _proven: list[tuple[str, Any, Any]] = field(default_factory=list, init=False)
     _driven: list[tuple[Any, Any]] = field(default_factory=list, init=False)
@@ -145,20 +150,24 @@ class Files:
         check_planned(steps, len(cars), rows)
         self._collector = Collector()
 
-    @property
-    def observer(self) -> "Observe":
+    def observer(self, cold: "ColdStarts | None") -> "Observe":
         """Who takes what files and cold starts need of solved cases: nobody where rows are all."""
         from hevopt.studies.by_car import unobserved
 
-        asked = (self._collector, self.proofs, self.steps, self.cold)
-        return unobserved if all(files is None for files in asked) else self._observe
+        watching = [of.observe for of in (self._collector, cold) if of is not None]
+        if self.proofs is not None or self.steps is not None:
+            watching.append(self._observe)
+        if not watching:
+            return unobserved
+
+        def all_of_them(case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
+            for observe in watching:
+                observe(case, row, plan, trajectory)
+
+        return all_of_them
 
     def _observe(self, case: "Case", row: "Row", plan: "Plan", trajectory: "Trajectory") -> None:
-        """Take what the files need of a solved case."""
-        if self._collector is not None:
-            self._collector.observe(case, row, plan, trajectory)
-        if self.cold is not None:
-            self.cold.observe(case, row, plan, trajectory)
+        """Take what proofs and steps need of a solved case."""
         if self.proofs is not None:
             name = f"{case.cycle.name}_{row.architecture}_{row.strategy}"
             self._proven.append((name, trajectory, case.certificate))

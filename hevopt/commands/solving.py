@@ -121,14 +121,14 @@ def compare(
     cars = cars_of(asked.architectures, settings)
     cold = None if cold_start is None else ColdStarts(cold_start)
     job = ComparisonJob(cars, load_cycle(asked.cycle), settings, study_path, others, cold)
-    files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit, cold)
+    files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit)
     files.check(job)
     compared = partial(
         study.compare_cars, cars.cars, settings=settings, others=others, forward=forward
     )
     say_how_long(job.trace, compared)
     with Progress() as progress:
-        watch = Watch(progress, files.observer)
+        watch = Watch(progress, files.observer(cold))
         comparison = compared(job.trace, watch=watch, may_fork=True)
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
     show_comparison(job, comparison, json=json, wide=wide)
