@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOption, takes_settings
-from hevopt.commands.reporting import check_page, command_line
+from hevopt.commands.reporting import check_ending, check_page, command_line
 from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, InfeasibleError
 
@@ -195,5 +195,4 @@ def _check_plot(plot: Path) -> None:
     from hevopt.files.writing import check_writable
 
     check_writable(plot)
-    if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise DataError(f"--plot {plot}: choose a name that ends in .png, .svg or .pdf")
+    check_ending("--plot", plot, ".png", ".svg", ".pdf")

@@ -9,7 +9,7 @@ import typer
 
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
-from hevopt.files.shown import encodable
+from hevopt.files.shown import encodable, printable
 
 
 def report(
@@ -34,5 +34,13 @@ def command_line() -> str:
 
 def check_page(report: Path | None) -> None:
     """DataError for a page whose name does not say that it is one."""
-    if report is not None and report.suffix.lower() not in (".html", ".htm"):
-        raise DataError(f"--report {report}: choose a name that ends in .html")
+    if report is not None and report.suffix.lower() != ".htm":
+        check_ending("--report", report, ".html")
+
+
+def check_ending(option: str, path: Path, *endings: str) -> None:
+    """DataError for a file whose name does not say what it is."""
+    if path.suffix.lower() not in endings:
+        *others, last = endings
+        said = f"{', '.join(others)} or {last}" if others else last
+        raise DataError(f"{option} {printable(str(path))}: choose a name that ends in {said}")

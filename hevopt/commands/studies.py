@@ -13,6 +13,7 @@ from hevopt.commands.options import (
     JsonOption,
     takes_settings,
 )
+from hevopt.commands.reporting import check_ending
 from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError
 
@@ -160,11 +161,9 @@ def _numbers(option: str, text: str) -> list[float]:
 
 
 def _check_csv(out: Path, inputs: Iterable[Path]) -> None:
-    from hevopt.files.shown import printable
     from hevopt.files.writing import check_outs
 
-    if out.suffix.lower() != ".csv":
-        raise DataError(f"--out {printable(str(out))}: choose a name that ends in .csv")
+    check_ending("--out", out, ".csv")
     check_outs({"--out": out}, inputs)
 
 

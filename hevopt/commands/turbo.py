@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from hevopt.commands.options import JsonOption
+from hevopt.commands.reporting import check_ending, check_page
 from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError
 
@@ -37,8 +38,7 @@ def full_load(
     from hevopt.tipin.study import settled_full_load
 
     if plot is not None:
-        if plot.suffix.lower() != ".png":
-            raise DataError(f"--plot {plot}: choose a name that ends in .png")
+        check_ending("--plot", plot, ".png")
         check_outs({"--plot": plot}, [find("architectures/components", engine, ".toml")])
     with Progress() as progress:
         found, known = settled_full_load(engine, progress)
@@ -176,8 +176,7 @@ def _print_json(study: "TipInStudy") -> None:
 def _check_page(report: Path, manoeuvre: "Manoeuvre") -> None:
     from hevopt.files.writing import check_outs
 
-    if report.suffix.lower() not in (".html", ".htm"):
-        raise DataError(f"--report {report}: choose a name that ends in .html")
+    check_page(report)
     check_outs({"--report": report}, manoeuvre.architecture.files)
 
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
+from hevopt.commands.reporting import check_ending, command_line
 from hevopt.commands.terminal import Progress, listed, write
-from hevopt.errors import DataError
 
 
 def validation(
@@ -30,41 +30,38 @@ def validation(
     ] = False,
 ) -> None:
     """The real cars beside what laboratories measured, with what lies between in parts; or in another tool."""
-    from hevopt.commands.reporting import command_line
-    from hevopt.files.shown import printable
     from hevopt.files.writing import check_outs, write_whole
-    from hevopt.reproduction.validation.cases import hold
     from hevopt.reproduction.validation.laboratory import measured_files
-    from hevopt.reproduction.validation.page import COMMAND, page
 
-    endings = (".md",) if fastsim else (".md", ".html")
-    if out.suffix.lower() not in endings:
-        said = " or ".join(endings)
-        raise DataError(f"--out {printable(str(out))}: choose a name that ends in {said}")
+    check_ending("--out", out, *((".md",) if fastsim else (".md", ".html")))
     check_outs({"--out": out}, measured_files())
-    if fastsim:
-        _across(out, listed(cars), listed(cycles))
-        return
+    wanted = listed(cars), listed(cycles)
     with Progress() as progress:
-        held = hold(listed(cars), listed(cycles), progress)
-    command = COMMAND if cars is None and cycles is None else command_line()
-    text = page(held, command)
-    if out.suffix.lower() == ".html":
-        from hevopt.pages.validation import validation_page
-
-        text = validation_page(held, text)
+        text = _across(*wanted, progress) if fastsim else _beside(*wanted, progress, out)
     write_whole(out, text.encode())
     write(f"written to {out}")
 
 
-def _across(out: Path, cars: list[str] | None, cycles: list[str] | None) -> None:
-    from hevopt.commands.reporting import command_line
-    from hevopt.files.writing import write_whole
+def _beside(cars: list[str] | None, cycles: list[str] | None, progress: Progress, out: Path) -> str:
+    from hevopt.reproduction.validation.cases import hold
+    from hevopt.reproduction.validation.page import COMMAND, page
+
+    held = hold(cars, cycles, progress)
+    text = page(held, _command(COMMAND, cars, cycles))
+    if out.suffix.lower() != ".html":
+        return text
+    from hevopt.pages.validation import validation_page
+
+    return validation_page(held, text)
+
+
+def _across(cars: list[str] | None, cycles: list[str] | None, progress: Progress) -> str:
     from hevopt.reproduction.cross_tool.held import hold_across
     from hevopt.reproduction.cross_tool.page import COMMAND, cross_page
 
-    with Progress() as progress:
-        held = hold_across(cars, cycles, progress)
-    command = COMMAND if cars is None and cycles is None else command_line()
-    write_whole(out, cross_page(held, command).encode())
-    write(f"written to {out}")
+    return cross_page(hold_across(cars, cycles, progress), _command(COMMAND, cars, cycles))
+
+
+def _command(whole: str, cars: list[str] | None, cycles: list[str] | None) -> str:
+    """What makes the page: of all cars and cycles, or as it was given."""
+    return whole if cars is None and cycles is None else command_line()
