@@ -1,5 +1,6 @@
 """The mean-value engine in the driven car: where its gas begins, how finely it is marched, what it leaves."""
 
+from collections.abc import Iterator
 from typing import Literal, get_args
 
 import numpy as np
@@ -48,46 +49,47 @@ class Breathing:
         self, car: LoopCar, task: LoopTask, work: Work, loop: Loop, first: int, record: Array, step_s: float
     ) -> Loop:  # fmt: skip
         """The loop after some more steps, as `_drive_kernels.advance` with the steady map."""
-        done = 0
-        while done < len(record):
-            air, count, breath = self._some(len(record) - done, step_s)
-            part = record[done : done + count]
+        for done, part, air, breath in self._pieces(record, step_s):
             loop = col.advance_breathing(
                 car, task, work, loop, first + done, part, step_s, air, self._gas, breath
             )
-            done += count
         return loop
 
     def pull(
         self, car: LoopCar, by_gear: Indices, foot: Foot, work: PullWork, moved: Pull, step_s: float, record: Array
     ) -> Pull:  # fmt: skip
         """The car at full pedal after some more steps."""
-        done = 0
-        while done < len(record):
-            air, count, breath = self._some(len(record) - done, step_s)
-            part = record[done : done + count]
+        for _, part, air, breath in self._pieces(record, step_s):
             moved = col.pull_breathing(
                 car, by_gear, foot, work, moved, step_s, part, air, self._gas, breath
             )
-            done += count
         return moved
 
-    def _some(self, steps: int, step_s: float) -> tuple[col.Air, int, Array]:
-        """How the next steps are marched, how many of them, and room for what they leave behind."""
-        if self._left == 0:
-            self._left = max(round(_GUARD_EVERY_S / step_s), 1)
-            longest = min(longest_step_s(0.0, self._gas, self._model), STEP_S)
-            if not longest * _PARTS_MAX > step_s:  # nor NaN
-                raise SolverError(
-                    f"the engine's gas asks for steps of {longest:.2g} s; check volumes, areas and pressure losses "
-                    "of its file"
-                )
-            self._parts = int(np.ceil(step_s / longest - 1e-9))
-        count = min(steps, self._left)
-        self._left -= count
-        breath = np.zeros((count, col.COLUMNS))
-        self._found.append(breath)
-        return col.Air(self._model, *TABLEAUX[4], self._parts), count, breath
+    def _pieces(self, record: Array, step_s: float) -> Iterator[tuple[int, Array, col.Air, Array]]:
+        """A record up to each look at the guard: steps before, the piece, how it is marched, and room for what it
+        leaves behind."""
+        done = 0
+        while done < len(record):
+            if self._left == 0:
+                self._left = max(round(_GUARD_EVERY_S / step_s), 1)
+                self._parts = self._parts_of(step_s)
+            count = min(len(record) - done, self._left)
+            self._left -= count
+            breath = np.zeros((count, col.COLUMNS))
+            self._found.append(breath)
+            air = col.Air(self._model, *TABLEAUX[4], self._parts)
+            yield done, record[done : done + count], air, breath
+            done += count
+
+    def _parts_of(self, step_s: float) -> int:
+        """In how many steps the gas as it is now marches one of the car."""
+        longest = min(longest_step_s(0.0, self._gas, self._model), STEP_S)
+        if not longest * _PARTS_MAX > step_s:  # nor NaN
+            raise SolverError(
+                f"the engine's gas asks for steps of {longest:.2g} s; check volumes, areas and pressure losses "
+                "of its file"
+            )
+        return int(np.ceil(step_s / longest - 1e-9))
 
     @property
     def breath(self) -> Array:
