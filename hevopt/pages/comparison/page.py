@@ -20,6 +20,7 @@ _J_PER_KWH = 3.6e6
 def comparison_page(results: Results) -> str:
     """The page as HTML, with the results inside."""
     calibrated = any(row.detail and row.detail.calibration for row in results.rows)
+    scope = _scope(results)
     studies = [("Calibration of the rules", calibrated), ("Sensitivity", results.sensitivity)]
     return render(
         "comparison.html.j2",
@@ -43,8 +44,8 @@ def comparison_page(results: Results) -> str:
             if car.about is not None
         ],
         assumptions=assumptions(results),
-        table=[_figures(results, row) for row in results.rows],
-        scope=_scope(results),
+        table=[_figures(row, scope) for row in results.rows],
+        scope=scope,
         scope_words=SCOPE_WORDS,
         worth=[_worth(results, row) for row in results.rows if row.detail is not None],
         energy=[_BalanceTable.of(results, row) for row in results.rows if row.detail is not None],
@@ -80,8 +81,8 @@ def _scope(results: Results) -> str:
     return scopes.pop() if len(scopes) == 1 and scopes <= set(SCOPE_WORDS) else ""
 
 
-def _figures(results: Results, row: SavedRow) -> dict[str, Any]:
-    """The row's figures, and what is derived from them for the table."""
+def _figures(row: SavedRow, scope: str) -> dict[str, Any]:
+    """The row's figures, and what is derived from them for the table; scope: see `_scope`."""
     figures = row.figures
     derived: dict[str, Any] = {"co2_corrected_g_per_km": None, "delta_soc": None}
     if figures.fuel_l_per_100km:
@@ -90,7 +91,7 @@ def _figures(results: Results, row: SavedRow) -> dict[str, Any]:
     if figures.soc_end is not None:
         derived["delta_soc"] = figures.soc_end - figures.soc_start
     claim = figures.certificate
-    proof = "" if claim is None else str(claim.proof if _scope(results) else claim)
+    proof = "" if claim is None else str(claim.proof if scope else claim)
     return figures.model_dump() | derived | {"proof": proof, "solved": row.detail is not None}
 
 
