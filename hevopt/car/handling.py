@@ -107,7 +107,8 @@ class Handling(NamedTuple):
                 check_ranges(part)
 
 
-_RANGES = {
+# Of tyres, clutch and gear changes, in a car's file as in the loops: lowest and highest.
+RANGES = {
     "lag_s": (0.0, 1.0),
     "friction": (0.05, 2.0),
     "driven_share": (0.05, 1.0),
@@ -130,7 +131,7 @@ _RANGES = {
 def check_ranges(part: Tyre | Clutch | Shifting) -> None:
     """DataError for a figure that no car has."""
     for name, value in part._asdict().items():
-        low, high = _RANGES[name]
+        low, high = RANGES[name]
         if not low <= value <= high:  # nor NaN
             raise DataError(
                 f"{type(part).__name__.lower()}: {name} {value:g}; allowed: {low:g} to {high:g}"

@@ -3,44 +3,47 @@
 What is left out is that of hevopt.car.handling, where every default stands with its source.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from hevopt.car.handling import Clutch, DriverGains, Handling, Shifting, Tyre
+from hevopt.car.handling import RANGES, Clutch, DriverGains, Handling, Shifting, Tyre
 from hevopt.files.toml import FileModel
 
-Share = Annotated[float, Field(ge=0.05, le=1)]
-Torque = Annotated[float, Field(ge=1, le=1e5)]
 Gain = Annotated[float, Field(ge=0, le=1000)]
 Lag = Annotated[float, Field(ge=0.01, le=10)]
+
+
+def _within(key: str) -> Any:
+    low, high = RANGES[key]
+    return Field(ge=low, le=high)
 
 
 class TyreFile(FileModel):
     """The driven tyres."""
 
-    lag_s: Annotated[float, Field(ge=0, le=1)] | None = None
-    friction: Annotated[float, Field(ge=0.05, le=2)] | None = None
-    driven_share: Share | None = None
-    height_share: Annotated[float, Field(ge=0, le=1)] | None = None
+    lag_s: Annotated[float, _within("lag_s")] | None = None
+    friction: Annotated[float, _within("friction")] | None = None
+    driven_share: Annotated[float, _within("driven_share")] | None = None
+    height_share: Annotated[float, _within("height_share")] | None = None
 
 
 class ClutchFile(FileModel):
     """The driver's clutch."""
 
-    slipping_nm: Torque | None = None
-    sticking_nm: Torque | None = None
-    slip_scale_radps: Annotated[float, Field(ge=1e-3, le=1e4)] | None = None
-    closing_s: Annotated[float, Field(ge=0, le=5)] | None = None
+    slipping_nm: Annotated[float, _within("slipping_nm")] | None = None
+    sticking_nm: Annotated[float, _within("sticking_nm")] | None = None
+    slip_scale_radps: Annotated[float, _within("slip_scale_radps")] | None = None
+    closing_s: Annotated[float, _within("closing_s")] | None = None
 
 
 class ShiftingFile(FileModel):
     """How a gear is changed."""
 
-    gap_s: Annotated[float, Field(ge=0, le=5)] | None = None
-    ratio_lag_s: Annotated[float, Field(ge=0, le=2)] | None = None
-    between_s: Annotated[float, Field(ge=0, le=60)] | None = None
-    reversal_s: Annotated[float, Field(ge=0, le=600)] | None = None
+    gap_s: Annotated[float, _within("gap_s")] | None = None
+    ratio_lag_s: Annotated[float, _within("ratio_lag_s")] | None = None
+    between_s: Annotated[float, _within("between_s")] | None = None
+    reversal_s: Annotated[float, _within("reversal_s")] | None = None
 
 
 class DriverFile(FileModel):
