@@ -29,7 +29,8 @@ def pytest_collection_modifyitems(items):
     listed = slow()
     for item in items:
         name = item.nodeid.removeprefix("tests/").split("[")[0]
-        if name in listed or name.split("::")[0] in listed:
+        dear = name in listed or name.split("::")[0] in listed
+        if dear and not item.get_closest_marker("long"):
             item.add_marker("slow")
     items.sort(key=place)
 
