@@ -9,6 +9,7 @@ Problem n is always the same. Exit status 1 and one line per fault where somethi
 
 import argparse
 import sys
+import warnings
 from pathlib import Path
 
 if __name__ == "__main__":
@@ -17,6 +18,8 @@ if __name__ == "__main__":
 from proofs.check import faults_of
 from proofs.draw import draw
 from proofs.split import split_faults
+
+from hevopt.errors import CoarseTableWarning
 
 # Strategies that take long are tried on every so many problems.
 _RARE_EVERY = 50
@@ -41,6 +44,7 @@ def main() -> int:
     options.add_argument("--first", type=int, default=0, help="number of the first")
     options.add_argument("--nodes", type=int, default=1001, help="of dp and of the last rungs")
     given = options.parse_args()
+    warnings.simplefilter("ignore", CoarseTableWarning)  # coarse tables are what is tried
     faults = 0
     for n in range(given.first, given.first + given.count):
         for fault in attack(range(n, n + 1), given.nodes):
