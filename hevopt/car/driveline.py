@@ -10,7 +10,17 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Literal, NamedTuple
 
-from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, OneWayClutch, Part, Planetary, ShaftBrake
+from hevopt.car.parts import (
+    WHEEL,
+    Clutch,
+    Gear,
+    Gearbox,
+    OneWayClutch,
+    Part,
+    Planetary,
+    ShaftBrake,
+    TorqueConverter,
+)
 
 ENGINE, BRAKE = "engine", "brake"
 
@@ -79,7 +89,7 @@ class Driveline:
     @property
     def engine_apart(self) -> bool:
         """Whether an engine is joined to the wheels by clutches alone, if at all."""
-        fixed = [part for part in self.parts if not isinstance(part, Clutch)]
+        fixed = [part for part in self.parts if not isinstance(part, Clutch | TorqueConverter)]
         return self.engine is not None and WHEEL not in _joined(self.engine, fixed)
 
     @property
@@ -98,7 +108,21 @@ class Driveline:
         clutches = (part for part in self.parts if isinstance(part, Clutch))
         return tuple(part for part in clutches if part.operation == "driver")
 
-    def served(self, clutch: Clutch) -> str | None:
+    @property
+    def converter(self) -> TorqueConverter | None:
+        """The torque converter in the place of a driver's clutch; None without one."""
+        return next((part for part in self.parts if isinstance(part, TorqueConverter)), None)
+
+    def slipping(self, state: State, phase: Phase) -> TorqueConverter | None:
+        """The torque converter where it slips: driving, or at standstill with a gear engaged; None elsewhere."""
+        part = self.converter
+        if part is None or not state.engine_on:
+            return None
+        if phase.standing:
+            return part if part.data.in_gear_at_rest else None
+        return part if phase.clutch == "slipping" and phase.box == self.served(part) else None
+
+    def served(self, clutch: Clutch | TorqueConverter) -> str | None:
         """The gearbox that a driver's clutch belongs to: one of its shafts is the input; None without gearboxes."""
         of_cycle = [box for box in self.boxes if box.choice != "free"]
         beside = [box.name for box in of_cycle if box.first in clutch.shafts]
@@ -127,6 +151,10 @@ class Driveline:
             return Use(part, "mesh")
         if isinstance(part, Gearbox):
             return _geared(part, state, phase)
+        if isinstance(part, TorqueConverter):
+            shut = phase.clutch
+            joins = state.engine_on and not phase.standing and phase.box == self.served(part)
+            return Use(part, shut) if joins and shut != "open" else None
         if isinstance(part, Clutch) and part.operation == "driver":
             served = self.served(part)
             if not state.engine_on or not (phase.standing or phase.box == served):

@@ -11,6 +11,7 @@ that is eta where power enters on the side of the joint's sense, else 1 / eta:
                           (-1, -k h, 1 + k h) lambda; the loss is on the rolling power, sun against carrier
     shaft brake           w = 0                         T = -lambda
     one-way clutch        locked like a closed one while it pushes, else none
+    torque converter      locked like a closed clutch; slipping none: its torques follow from both speeds
 """
 
 from collections.abc import Mapping
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from hevopt.car.gear_loss import GearLoss
 from hevopt.car.linear import Coefficient
+from hevopt.car.torque_converter import HydraulicConverter
 from hevopt.display.facts import Shown
 
 WHEEL = "wheel"
@@ -220,7 +222,26 @@ class ShaftBrake:
         return Joint(self.name, "clutch", {self.shaft: 1.0}, {self.shaft: (-1.0, 0.0)}, {})
 
 
-Part = Gear | Gearbox | Clutch | OneWayClutch | Planetary | ShaftBrake
+@dataclass(frozen=True, slots=True)
+class TorqueConverter:
+    """A torque converter in the place of the driver's clutch: first is the engine's side, the impeller's."""
+
+    name: str
+    first: str
+    second: str
+    data: HydraulicConverter
+
+    @property
+    def shafts(self) -> tuple[str, ...]:
+        """The shafts that it joins."""
+        return self.first, self.second
+
+    def closed(self) -> Joint:
+        """Both shafts turn as one, by the lock-up clutch."""
+        return _geared(self.name, "clutch", self.first, self.second, 1.0, 1.0)
+
+
+Part = Gear | Gearbox | Clutch | OneWayClutch | Planetary | ShaftBrake | TorqueConverter
 
 
 def _geared(

@@ -1,7 +1,8 @@
 """Drivelines by name: what the coupling of a short architecture file stands for, part by part.
 
 kind             also    parts
-none                     engine - clutch - gearbox - wheels; an alternator on the crankshaft, which follows the load
+none                     engine - clutch - gearbox - wheels; an alternator on the crankshaft, which follows the
+                         load; a gearbox's torque converter takes the clutch's place, here and in the next three
 belt             P0      the same, a machine on the crankshaft
 crankshaft       P1      the same
 gearbox_input    P2      the machine on the gearbox's input, the clutch between engine and machine
@@ -23,7 +24,7 @@ from typing import Literal, NamedTuple
 
 from hevopt.car.driveline import Driveline
 from hevopt.car.machine import Machine
-from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Planetary
+from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Planetary, TorqueConverter
 from hevopt.car.transmission import Gearbox as GearboxData
 
 CouplingKind = Literal[
@@ -53,7 +54,13 @@ class Options(NamedTuple):
 
 def crankshaft(kind: str, options: Options, gearbox: GearboxData, machine: Machine) -> Driveline:
     """A, B, C1: the machine turns with the engine."""
-    parts = (Clutch("clutch", _CRANK, _INPUT, "driver"), _gearbox(gearbox))
+    converter = gearbox.torque_converter
+    between = (
+        Clutch("clutch", _CRANK, _INPUT, "driver")
+        if converter is None
+        else TorqueConverter("torque converter", _CRANK, _INPUT, converter)
+    )
+    parts = (between, _gearbox(gearbox))
     placed = (("machine", _CRANK),)
     return Driveline(kind, parts, _CRANK, placed, follows_load=kind == "none")
 

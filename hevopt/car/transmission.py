@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.car.gear_loss import GearLoss
+from hevopt.car.torque_converter import HydraulicConverter
 from hevopt.display.facts import Shown
 
 Array = NDArray[np.float64]
@@ -21,6 +22,7 @@ class Gearbox(Shown):
     gear is a control; None where it cannot be one
     shift_gap_s: time without torque at a listed change of gear; 0 for a dual clutch gearbox
     loss: torque lost over gear, speed and torque; None where one efficiency of each gear says it
+    torque_converter: in the place of the driver's clutch; None where it is a clutch
     """
 
     name: str
@@ -33,6 +35,7 @@ class Gearbox(Shown):
     engine_speed_min_radps: float = 0.0
     shift_gap_s: float = 0.0
     loss: GearLoss | None = None
+    torque_converter: HydraulicConverter | None = None
 
     def needed_nm(self, gear: NDArray[np.int64], input_radps: Array, output_nm: Array) -> Array:
         """(time,) torque at the input for one at the wheels, each in a gear and at a speed of the input."""

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.car.driveline import BRAKE, ENGINE, Driveline, Phase, State, Use
-from hevopt.car.linear import Coefficient
+from hevopt.car.driveline import ENGINE, Driveline, Phase, State, Use
+from hevopt.car.freedom import Freedom, dependent, loose, row
 from hevopt.car.parts import (
     WHEEL,
     Clutch,
@@ -22,14 +22,13 @@ from hevopt.car.parts import (
     Joint,
     OneWayClutch,
     Part,
+    TorqueConverter,
 )
 from hevopt.errors import DataError
 
-Array = NDArray[np.float64]
 # How the speed of a shaft comes about that neither joints nor wheels determine.
-Held = Literal["rest", "idle", "launch", "free"]
+Held = Literal["rest", "idle", "launch", "impeller", "free"]
 CHOICES_MAX = 2
-_TINY = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +41,7 @@ class Way:
     slack: what gives way to the friction brake while the car brakes; None where nothing but the brake acts on
     the wheels, or where it holds them (standing)
     freed: the one-way clutches that do not push; tied: whether the engine turns with the wheels
+    converter: the torque converter that slips; at standstill its other shaft rests
     """
 
     uses: tuple[Use, ...]
@@ -53,10 +53,11 @@ class Way:
     slack: str | None
     freed: tuple[OneWayClutch, ...]
     tied: bool
+    converter: TorqueConverter | None = None
 
     def joints(self, gear: NDArray[np.int64] | int) -> tuple[Joint, ...]:
         """The joints, with the gear that the cycle lists: one, or one per step."""
-        return tuple(_joint(use, gear) for use in self.uses)
+        return _joints(self.uses, gear)
 
 
 @lru_cache(maxsize=4096)
@@ -66,8 +67,9 @@ def way(driveline: Driveline, state: State, phase: Phase) -> Way:
     turning = _turning(driveline, uses, state)
     uses = tuple(use for use in uses if set(use.part.shafts) <= turning)
     shafts = tuple(shaft for shaft in driveline.shafts if shaft in turning)
-    joints = tuple(_joint(use, _any_gear(use)) for use in uses)
-    held, tied = _held(driveline, state, shafts, joints)
+    joints = _joints(uses)
+    apart = any(map(_slips, uses))
+    held, tied = _held(driveline, state, shafts, joints, "impeller" if apart else None)
     active = {name: shaft for name, shaft in driveline.machines if shaft in turning}
     if phase.standing:
         still = _still(shafts, joints, held)
@@ -79,15 +81,15 @@ def way(driveline: Driveline, state: State, phase: Phase) -> Way:
         rest = _joined(uses, WHEEL) - {WHEEL}
         uses = tuple(use for use in uses if not rest & set(use.part.shafts))
         shafts = tuple(shaft for shaft in shafts if shaft not in rest)
-        joints = tuple(_joint(use, _any_gear(use)) for use in uses)
+        joints = _joints(uses)
         held = {shaft: how for shaft, how in held.items() if shaft not in rest}
     free, follows = "free" in held.values(), driveline.follows_load
-    balance = _Balance(driveline, shafts, joints, active, standing=phase.standing)
+    balance = Freedom(shafts, joints, active, standing=phase.standing)
     chosen, slack = balance.choices(free, follows=follows)
     while phase.standing and len(chosen) + free > CHOICES_MAX:
         # At standstill machines may push against each other and the brakes: the last of them does not.
         del active[[name for name in active if name != ENGINE][-1]]
-        balance = _Balance(driveline, shafts, joints, active, standing=phase.standing)
+        balance = Freedom(shafts, joints, active, standing=phase.standing)
         chosen, slack = balance.choices(free, follows=follows)
     if len(chosen) + free > CHOICES_MAX:
         raise DataError(
@@ -101,7 +103,21 @@ def way(driveline: Driveline, state: State, phase: Phase) -> Way:
         for part in driveline.parts
         if isinstance(part, OneWayClutch) and part.name not in state.closed
     )
-    return Way(uses, shafts, held, active, chosen, closing, slack, freed, tied)
+    converter = driveline.slipping(state, phase)
+    return Way(uses, shafts, held, active, chosen, closing, slack, freed, tied, converter)
+
+
+def _joints(
+    uses: Iterable[Use], listed: NDArray[np.int64] | int | None = None
+) -> tuple[Joint, ...]:
+    """What uses tie, in the gear listed or in any; a torque converter that slips ties nothing."""
+    return tuple(
+        _joint(use, _any_gear(use) if listed is None else listed) for use in uses if not _slips(use)
+    )
+
+
+def _slips(use: Use) -> bool:
+    return isinstance(use.part, TorqueConverter) and use.state == "slipping"
 
 
 def _joint(use: Use, listed: NDArray[np.int64] | int) -> Joint:
@@ -110,6 +126,8 @@ def _joint(use: Use, listed: NDArray[np.int64] | int) -> Joint:
         return part.joint(listed if use.gear is None else use.gear)
     if isinstance(part, Clutch):
         return part.slipping() if use.state == "slipping" else part.closed()
+    if isinstance(part, TorqueConverter):
+        return part.closed()
     return part.locked() if isinstance(part, OneWayClutch) else part.joint()
 
 
@@ -160,28 +178,33 @@ def _joined(uses: Iterable[Use], shaft: str) -> set[str]:
 
 
 def _held(
-    driveline: Driveline, state: State, shafts: Sequence[str], joints: Sequence[Joint]
+    driveline: Driveline,
+    state: State,
+    shafts: Sequence[str],
+    joints: Sequence[Joint],
+    by_converter: Held | None,
 ) -> tuple[dict[str, Held], bool]:
     """The shafts whose speed is held or chosen and how, and whether joints tie the engine to the wheels."""
-    rows = [_row(joint.speed, shafts) for joint in joints if joint.speed]
+    rows = [row(joint.speed, shafts) for joint in joints if joint.speed]
     names = [joint.name for joint in joints if joint.speed] + ["the wheels"]
-    matrix = np.array([*rows, _row({WHEEL: 1.0}, shafts)])
+    matrix = np.array([*rows, row({WHEEL: 1.0}, shafts)])
     if np.linalg.matrix_rank(matrix) < len(matrix):
         raise DataError(
-            f"driveline: with {_words(state)}, speeds are locked by {_dependent(matrix, names)}"
+            f"driveline: with {_words(state)}, speeds are locked by {dependent(matrix, names)}"
         )
     held: dict[str, Held] = {}
     tied, engine = True, driveline.engine
-    if engine in shafts and engine in _loose(matrix, shafts):
+    if engine in shafts and engine in loose(matrix, shafts):
         tied = False
         held[engine] = "rest"
         if state.engine_on:
             slips = any(not joint.speed for joint in joints)
-            held[engine] = "launch" if slips else "free" if driveline.free_engine_speed else "idle"
-        matrix = np.vstack([matrix, _row({engine: 1.0}, shafts)])
-    if loose := _loose(matrix, shafts):
+            own: Held = "free" if driveline.free_engine_speed else "idle"
+            held[engine] = by_converter or ("launch" if slips else own)
+        matrix = np.vstack([matrix, row({engine: 1.0}, shafts)])
+    if unheld := loose(matrix, shafts):
         raise DataError(
-            f"driveline: with {_words(state)}, nothing determines the speed of {', '.join(loose)}; join it to "
+            f"driveline: with {_words(state)}, nothing determines the speed of {', '.join(unheld)}; join it to "
             "another shaft, or hold it by a brake or clutch"
         )
     return held, tied
@@ -189,110 +212,7 @@ def _held(
 
 def _still(shafts: Sequence[str], joints: Sequence[Joint], held: Mapping[str, Held]) -> set[str]:
     """The shafts that do not turn while the wheels stand, whatever is held or chosen."""
-    rows = [_row(joint.speed, shafts) for joint in joints if joint.speed]
-    rows += [_row({WHEEL: 1.0}, shafts)]
-    rows += [_row({shaft: 1.0}, shafts) for shaft, how in held.items() if how == "rest"]
-    return set(shafts) - set(_loose(np.array(rows), shafts))
-
-
-class _Balance:
-    """The torques of a way in numbers: which may be chosen, and what closes the balance."""
-
-    def __init__(
-        self,
-        driveline: Driveline,
-        shafts: Sequence[str],
-        joints: Sequence[Joint],
-        active: Mapping[str, str],
-        *,
-        standing: bool,
-    ) -> None:
-        self.joints, self.shafts = joints, shafts
-        self.names = [*(joint.name for joint in joints), *active, BRAKE]
-        columns = [
-            _row({s: c0 + c1 for s, (c0, c1) in joint.reaction.items()}, shafts) for joint in joints
-        ]
-        columns += [_row({shaft: 1.0}, shafts) for shaft in (*active.values(), WHEEL)]
-        self.matrix = np.array(columns).T
-        self.machines = [name for name in active if name != ENGINE]
-        self.engine = [ENGINE] if ENGINE in active else []
-        reached = self._reached({WHEEL}, shafts)
-        self.wheels_moved = any(shaft in reached for shaft in active.values()) and not standing
-
-    def choices(self, free_speed: bool, *, follows: bool) -> tuple[tuple[str, ...], str | None]:
-        """The torques chosen, and the slack."""
-        order = [*self.engine, *self.machines] if free_speed else [*self.machines, *self.engine]
-        given = [BRAKE] if self.wheels_moved else []
-        chosen = list(self.machines) if follows else []
-        for name in order:
-            if self._rank([*given, *chosen]) == len(self.names):
-                break
-            if self._rank([*given, *chosen, name]) > self._rank([*given, *chosen]):
-                chosen.append(name)
-        rows = self._rows([*given, *chosen])
-        if np.linalg.matrix_rank(rows) < len(self.names):
-            parts = ", ".join(self._undetermined(rows))
-            raise DataError(
-                f"driveline: the torques of {parts} are not determined: a redundant loop; leave one of its parts "
-                "out, or open it by a clutch"
-            )
-        if len(rows) > len(self.names):
-            parts = _dependent(rows, [*self.shafts, *given, *chosen])
-            raise DataError(
-                f"driveline: nothing balances the torques on {parts}; give one of them an engine, a machine or "
-                "a brake"
-            )
-        slack = None
-        if self.wheels_moved:
-            closers = [name for name in (*self.engine, *self.machines[::-1]) if name not in chosen]
-            fits = (n for n in closers if self._rank([*chosen, n]) == len(self.names))
-            slack = next(fits, None)
-        return tuple(chosen), slack
-
-    def solved_with(self, name: str, chosen: Sequence[str]) -> tuple[str, ...]:
-        """The actuators that close the balance of the shafts on which a chosen torque acts."""
-        given = [BRAKE, *chosen] if self.wheels_moved else list(chosen)
-        inverse = np.linalg.pinv(self._rows(given))
-        effect = inverse[:, self.matrix.shape[0] + given.index(name)]
-        closers = [*self.engine, *self.machines]
-        return tuple(
-            n for n in closers if n not in chosen and abs(effect[self.names.index(n)]) > _TINY
-        )
-
-    def _rows(self, given: Sequence[str]) -> Array:
-        units = [np.eye(len(self.names))[self.names.index(name)] for name in given]
-        return np.vstack([self.matrix, *units]) if units else self.matrix
-
-    def _rank(self, given: Sequence[str]) -> int:
-        return int(np.linalg.matrix_rank(self._rows(given)))
-
-    def _undetermined(self, rows: Array) -> list[str]:
-        null = np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows) :]
-        return [n for n, x in zip(self.names, np.abs(null).max(0), strict=True) if x > _TINY]
-
-    def _reached(self, start: set[str], shafts: Sequence[str]) -> set[str]:
-        for _ in shafts:
-            for joint in self.joints:
-                if start & set(joint.reaction):
-                    start = start | set(joint.reaction)
-        return start
-
-
-def _row(coefficients: Mapping[str, Coefficient], shafts: Sequence[str]) -> Array:
-    return np.array([float(coefficients.get(shaft, 0.0)) for shaft in shafts])
-
-
-def _loose(matrix: Array, shafts: Sequence[str]) -> list[str]:
-    """The shafts whose speed rows do not determine."""
-    rank = np.linalg.matrix_rank(matrix)
-    if rank == len(shafts):
-        return []
-    spread = np.abs(np.linalg.svd(matrix)[2][rank:]).max(0)
-    return [shaft for shaft, x in zip(shafts, spread, strict=True) if x > _TINY]
-
-
-def _dependent(matrix: Array, names: Sequence[str]) -> str:
-    """The rows that depend on each other."""
-    null = np.linalg.svd(matrix.T)[2][np.linalg.matrix_rank(matrix) :]
-    found = [n for n, x in zip(names, np.abs(null).max(0), strict=True) if x > _TINY]
-    return ", ".join(found)
+    rows = [row(joint.speed, shafts) for joint in joints if joint.speed]
+    rows += [row({WHEEL: 1.0}, shafts)]
+    rows += [row({shaft: 1.0}, shafts) for shaft, how in held.items() if how == "rest"]
+    return set(shafts) - set(loose(np.array(rows), shafts))

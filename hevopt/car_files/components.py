@@ -11,6 +11,7 @@ from hevopt.car.engine_laws import CompactLaw, EngineMap, FuelCoefficients, NoxC
 from hevopt.car.gear_loss import GearLoss, LossInGear
 from hevopt.car.machine import Machine, TorqueCurve
 from hevopt.car.machine_laws import LossByCoefficients, LossByEfficiency, LossLaw, LossMap
+from hevopt.car.torque_converter import HydraulicConverter
 from hevopt.car.transmission import Gearbox
 from hevopt.car.vehicle import Vehicle
 from hevopt.car_files.architecture import ConverterFile
@@ -18,7 +19,7 @@ from hevopt.car_files.battery import BatteryFile, LinearVoltageFile
 from hevopt.car_files.car import BrakingFile, CarFile
 from hevopt.car_files.engine import EngineFile, EngineGridFile
 from hevopt.car_files.fields import FullLoadFile
-from hevopt.car_files.gearbox import GearboxFile, GearLossFile
+from hevopt.car_files.gearbox import GearboxFile, GearLossFile, TorqueConverterFile
 from hevopt.car_files.machine import LossMapFile, MachineFile
 from hevopt.errors import DataError
 from hevopt.problem.battery import Battery
@@ -135,6 +136,20 @@ def gearbox_of(data: GearboxFile) -> Gearbox:
         0.0 if free is None else free.engine_speed_min_rpm * TO_SI["_rpm"][1],
         data.shift_gap_s,
         loss,
+        None if data.torque_converter is None else _torque_converter(data.torque_converter),
+    )
+
+
+def _torque_converter(data: TorqueConverterFile) -> HydraulicConverter:
+    radps = TO_SI["_rpm"][1]
+    lock_up_rpm = data.lock_up_speed_rpm
+    return HydraulicConverter(
+        np.array(data.speed_ratio),
+        np.array(data.torque_ratio),
+        np.array(data.impeller_torque_nm) / (data.impeller_speed_rpm * radps) ** 2,
+        inf if lock_up_rpm is None else lock_up_rpm * radps,
+        data.lock_up_gear_min,
+        data.at_rest == "in_gear",
     )
 
 

@@ -8,7 +8,9 @@ from hevopt.car.templates import CouplingKind
 from hevopt.car_files.fields import Fraction, KeysOfKind, Name, Ratio, ShiftFuel
 from hevopt.files.toml import FileModel
 
-PartKind = Literal["gear", "gearbox", "clutch", "one_way_clutch", "planetary", "shaft_brake"]
+PartKind = Literal[
+    "gear", "gearbox", "clutch", "one_way_clutch", "planetary", "shaft_brake", "torque_converter"
+]
 Ratios = Annotated[list[Ratio], Field(min_length=1, max_length=20)]
 
 _KEYS_OF_PART = KeysOfKind(
@@ -19,6 +21,7 @@ _KEYS_OF_PART = KeysOfKind(
         "one_way_clutch": {"first"},
         "planetary": {"sun", "ring", "carrier", "ratio"},
         "shaft_brake": {"first"},
+        "torque_converter": {"first", "second"},
     },
     {
         "gear": {"efficiency"},

@@ -1,25 +1,31 @@
 """What a gearbox's file may hold: ratios, efficiency, shift speeds, and the limits of a gear chosen freely."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from hevopt.car.gear_loss import too_steep
+from hevopt.car.torque_converter import flaw
 from hevopt.car_files.fields import (
     Curve,
     Fraction,
     List,
     Name,
+    NotNegative,
     Number,
     Positive,
     Ratio,
     Shape,
     ShiftFuel,
+    Soc,
     Speeds,
     check_grid,
 )
 from hevopt.files.toml import FileModel
+
+# No converter of one stage comes near to the upper end.
+TorqueRatio = Annotated[float, Field(ge=0.1, le=10)]
 
 
 class ShiftSpeedsFile(FileModel):
@@ -58,6 +64,35 @@ class GearLossFile(FileModel):
         return self
 
 
+class TorqueConverterFile(FileModel):
+    """A torque converter in the place of the driver's clutch: curves at one speed of its impeller."""
+
+    speed_ratio: Annotated[list[Soc], Field(min_length=2, max_length=1000)]
+    torque_ratio: Annotated[list[TorqueRatio], Field(min_length=2, max_length=1000)]
+    impeller_speed_rpm: Annotated[float, Field(ge=100, le=20_000)]
+    impeller_torque_nm: Annotated[list[NotNegative], Field(min_length=2, max_length=1000)]
+    lock_up_speed_rpm: Annotated[float, Field(ge=0, le=20_000)] | None = None
+    lock_up_gear_min: Annotated[int, Field(ge=1, le=20)] = 1
+    at_rest: Literal["in_gear", "neutral"] = "in_gear"
+
+    @model_validator(mode="after")
+    def _curves(self) -> Self:
+        points = len(self.speed_ratio)
+        for name in ("torque_ratio", "impeller_torque_nm"):
+            if len(getattr(self, name)) != points:
+                raise ValueError(
+                    f"{name} has {len(getattr(self, name))} values; speed_ratio has {points}"
+                )
+        curves = (self.speed_ratio, self.torque_ratio, self.impeller_torque_nm)
+        if (wrong := flaw(*map(np.array, curves))) is not None:
+            raise ValueError(wrong)
+        if self.lock_up_speed_rpm is None and "lock_up_gear_min" in self.model_fields_set:
+            raise ValueError(
+                "lock_up_gear_min needs lock_up_speed_rpm, without which it never locks"
+            )
+        return self
+
+
 class GearboxFile(FileModel):
     name: Name
     ratios: Annotated[list[Ratio], Field(min_length=1, max_length=20)]
@@ -69,6 +104,20 @@ class GearboxFile(FileModel):
     shift_gap_s: Annotated[float, Field(ge=0, le=5)] = 0.0
     shift_speeds: ShiftSpeedsFile
     free_gear: FreeGearFile | None = None
+    torque_converter: TorqueConverterFile | None = None
+
+    @model_validator(mode="after")
+    def _under_load(self) -> Self:
+        converter = self.torque_converter
+        if converter is not None and self.shift_gap_s > 0:
+            raise ValueError(
+                f"shift_gap_s {self.shift_gap_s:g}: with a torque_converter gears change under load; make it 0"
+            )
+        if converter is not None and converter.lock_up_gear_min > len(self.ratios):
+            raise ValueError(
+                f"torque_converter: lock_up_gear_min {converter.lock_up_gear_min}; allowed: 1 to {len(self.ratios)}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _lengths(self) -> Self:

@@ -28,7 +28,7 @@ from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.handling import handling_of
 from hevopt.car_files.machine import MachineFile
-from hevopt.car_files.parts import driveline_of
+from hevopt.car_files.parts import check_converter, driveline_of
 from hevopt.car_files.source import SourceFile, source_of
 from hevopt.car_files.weighing import WEIGHED, added_kg, resized, weighed
 from hevopt.errors import DataError
@@ -143,7 +143,12 @@ def _driveline(
             f"{path}, gearbox: {shown(file)} has 1 gear; coupling kind 'even_shaft' needs 2 "
             "or more; choose another gearbox or kind"
         )
-    return TEMPLATES[kind](kind, options, gearbox, machines["machine"])
+    line = TEMPLATES[kind](kind, options, gearbox, machines["machine"])
+    try:
+        check_converter(line, gearbox)
+    except DataError as error:
+        raise DataError(f"{path}, coupling kind {kind!r}: {error}") from None
+    return line
 
 
 def _thresholds(data: RulesFile | None) -> Thresholds:

@@ -3,6 +3,7 @@
 Model of a file or table -> key -> (unit, meaning). A test keeps it complete.
 """
 
+from hevopt.car_files.gearbox_meanings import GEARBOX_MEANINGS
 from hevopt.car_files.handling_meanings import HANDLING_MEANINGS
 from hevopt.car_files.mean_value_meanings import MEAN_VALUE_MEANINGS
 
@@ -82,7 +83,7 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "PartFile": {
         "kind": ("", "gear (a pair of gears, a final drive, an axle), gearbox, clutch, one_way_clutch, planetary, "
-                 "shaft_brake"),
+                 "shaft_brake, torque_converter (with the curves of the architecture's gearbox)"),
         "name": ("", "name shown in messages"),
         "first": ("", "the shaft on its input side; of a shaft brake the one that it holds"),
         "second": ("", "the other shaft; a one_way_clutch without it keeps first from turning backwards"),
@@ -200,32 +201,7 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "p1": ("bar", "its change per 1000/min"),
         "dp": ("bar", "width of the rise"),
     },
-    "GearboxFile": {
-        "name": _NAME,
-        "ratios": ("-", "input speed over output speed of each gear, first gear first, falling"),
-        "final_drive_ratio": ("-", "gearbox output speed over wheel speed"),
-        "efficiency": ("-", "of gearbox and final drive together: one for all gears, or one per gear"),
-        "loss_map": ("", "in place of efficiency: one table per gear, in their order, of what gearbox and final "
-                     "drive lose; what lies outside is rejected"),
-        "shift_gap_s": ("s", "time without torque at a change of gear that cycle or shift speeds list; 0: "
-                        "the gearbox changes under load"),
-        "shift_speeds": ("", "when the driver changes gear, on cycles that list none"),
-        "free_gear": ("", "limits of a gear that the strategy chooses"),
-    },
-    "GearLossFile": {
-        "speed_rpm": ("1/min", "input speeds, rising; below the first the loss is that of the first"),
-        "torque_nm": ("Nm", "input torques, rising, below 0 in overrun"),
-        "loss_nm": ("Nm", "torque lost, referred to the input, a row per speed; nan where not measured"),
-    },
-    "ShiftSpeedsFile": {
-        "up_kmh": ("km/h", "speed above which each gear but the last is left for the next"),
-        "down_kmh": ("km/h", "speed below which the next is left again, each below its up_kmh"),
-        "engage_before_launch_s": ("s", "how long first gear is engaged before moving off"),
-    },
-    "FreeGearFile": {
-        "shift_fuel_g": ("g", "fuel that a change of gear counts"),
-        "engine_speed_min_rpm": ("1/min", "lowest engine speed above first gear"),
-    },
+    **GEARBOX_MEANINGS,
     "MachineFile": {
         "name": _NAME,
         "kind": ("", "the loss of machine and inverter is given by coefficients (loss), one efficiency, or a map"),

@@ -1,6 +1,7 @@
 """A driveline from the parts that an architecture's file lists, each state of it tried."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from hevopt.car.driveline import Driveline, Phase
 from hevopt.car.parts import (
@@ -12,6 +13,7 @@ from hevopt.car.parts import (
     Part,
     Planetary,
     ShaftBrake,
+    TorqueConverter,
 )
 from hevopt.car.transmission import Gearbox as GearboxData
 from hevopt.car.ways import joined, way
@@ -28,10 +30,12 @@ def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
     parts = tuple(_part(part, gearbox) for part in data.parts or ())
     shafts = data.shafts
     machines = tuple((name, shaft) for name, shaft in shafts.items() if name != "engine")
-    driven = any(isinstance(part, Clutch) and part.operation == "driver" for part in parts)
     engine = shafts.get("engine")
-    line = Driveline("parts", parts, engine, machines, engine is not None and not driven)
+    line = Driveline("parts", parts, engine, machines)
+    driven = bool(line.driver_clutches) or line.converter is not None
+    line = replace(line, free_engine_speed=engine is not None and not driven)
     _check_joined(parts, shafts)
+    check_converter(line, gearbox)
     if engine is None and (chosen := [part.name for part in parts if _is_chosen(part)]):
         raise DataError(
             f"driveline: without an engine gears may not be chosen: {', '.join(chosen)}; the objective, "
@@ -41,6 +45,44 @@ def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
         for phase in _phases(line):
             way(line, state, phase)
     return line
+
+
+def check_converter(line: Driveline, gearbox: GearboxData | None) -> None:
+    """DataError where a torque converter stands elsewhere than between an engine and a gearbox's input.
+
+    All that its turbine drives follows from what the wheels ask for, so that no choice lies behind it.
+    """
+    part = line.converter
+    if part is None:
+        if gearbox is not None and gearbox.torque_converter is not None:
+            raise DataError(
+                f"driveline: gearbox {gearbox.name!r} has a torque_converter, and no part of the driveline is one; "
+                "make it one in place of the driver's clutch, or take the table out of the gearbox"
+            )
+        return
+    before = joined([other for other in line.parts if other != part], part.first)
+    behind = joined([other for other in line.parts if other != part], part.second)
+    wrong = None
+    if part.first != line.engine:
+        wrong = f"its first shaft is {part.first!r}, the engine's {line.engine!r}"
+    elif before & behind or WHEEL not in behind:
+        wrong = f"its second shaft, {part.second!r}, does not lead to the wheels, or its first does as well"
+    elif others := [name for name, shaft in line.machines if shaft not in before]:
+        wrong = f"{', '.join(others)} turns behind it or apart from it"
+    elif others := [other.name for other in line.parts if other != part and _is_switched(other)]:
+        wrong = f"{', '.join(others)} would be chosen or slip beside it"
+    elif sum(isinstance(other, Gearbox) for other in line.parts) != 1:
+        wrong = "it needs one gearbox, and no other"
+    if wrong:
+        raise DataError(
+            f"driveline: torque converter {part.name!r} stands where none can be solved: {wrong}; allowed: engine, "
+            "and machines on its shaft, then the torque converter, then the gearbox and gears to the wheels"
+        )
+
+
+def _is_switched(part: Part) -> bool:
+    free = isinstance(part, Gearbox) and part.choice != "listed"
+    return free or isinstance(part, Clutch | OneWayClutch | ShaftBrake | TorqueConverter)
 
 
 def _is_chosen(part: Part) -> bool:
@@ -88,6 +130,12 @@ def _part(data: PartFile, gearbox: GearboxData | None) -> Part:
         return OneWayClutch(data.name, first, data.second)
     if data.kind == "shaft_brake":
         return ShaftBrake(data.name, first)
+    if data.kind == "torque_converter":
+        if gearbox is None or gearbox.torque_converter is None:
+            raise DataError(
+                f"{data.name}: the architecture's gearbox has no table torque_converter with its curves; add it"
+            )
+        return TorqueConverter(data.name, first, second, gearbox.torque_converter)
     return _gearbox(data, gearbox)
 
 

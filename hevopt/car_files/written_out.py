@@ -4,7 +4,15 @@ from math import isfinite
 from typing import Any
 
 from hevopt.car.driveline import Driveline
-from hevopt.car.parts import Clutch, Gear, Gearbox, OneWayClutch, Part, Planetary
+from hevopt.car.parts import (
+    Clutch,
+    Gear,
+    Gearbox,
+    OneWayClutch,
+    Part,
+    Planetary,
+    TorqueConverter,
+)
 from hevopt.errors import DataError
 from hevopt.units import TO_SI
 
@@ -37,6 +45,8 @@ def _part(part: Part, kind: str) -> dict[str, Any]:
         return {"kind": "gearbox", **table, **_gears(part, kind)}
     if isinstance(part, Clutch):
         return {"kind": "clutch", **table, "operation": part.operation}
+    if isinstance(part, TorqueConverter):
+        return {"kind": "torque_converter", **table}
     return {"kind": "one_way_clutch" if isinstance(part, OneWayClutch) else "shaft_brake", **table}
 
 

@@ -25,8 +25,8 @@ _KINDS: dict[str, type[FileModel]] = {**MODELS, COMPARE: CompareFile, SWEEP: Stu
 _LINES_LISTED = 20
 _MEGABYTES_MAX = 50
 _KEYS_LISTED = 200
-# A shipped car in which a component is tried out.
-_TRIED_IN = "C2"
+# A shipped car in which a component is tried out; a gearbox in one that takes a torque converter as well.
+_TRIED_IN, _GEARBOX_IN = "C2", "C1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,8 @@ def component_faults(path: Path, contents: dict[str, Any], kind: str) -> tuple[l
     """
     faults = table_faults(str(path), contents, MODELS[kind])
     if not faults and kind != "source":
-        load_architecture(_TRIED_IN, {kind: str(path.absolute())})
+        car = _GEARBOX_IN if kind == "gearbox" else _TRIED_IN
+        load_architecture(car, {kind: str(path.absolute())})
     return faults, str(contents.get("name", ""))
 
 

@@ -93,7 +93,9 @@ def _check(car: Architecture) -> None:
     line, lacking = car.driveline, ""
     odd = [part.name for part in line.parts if not isinstance(part, Gear | Gearbox | Clutch)]
     odd += [p.name for p in line.parts if isinstance(p, Clutch) and p.operation != "driver"]
-    if line.engine is not None and not (line.boxes and line.driver_clutches):
+    if line.converter is not None:
+        lacking = f"{line.converter.name} slips, which the plant does not know"
+    elif line.engine is not None and not (line.boxes and line.driver_clutches):
         lacking = "its engine is behind no driver's clutch and gears"
     elif line.free_engine_speed:
         lacking = "its engine's speed is free"

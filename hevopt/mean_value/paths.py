@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import Phase, State
-from hevopt.car.parts import WHEEL, Clutch, Joint
+from hevopt.car.parts import WHEEL, Clutch, Joint, TorqueConverter
 from hevopt.car.ways import Way, way
 from hevopt.errors import DataError
 
@@ -33,7 +33,9 @@ class Paths(NamedTuple):
 
 
 def paths(architecture: Architecture, gear: int, speed_mps: float) -> Paths:
-    """The paths in a gear with the clutch closed; DataError where the car has no such gear, or no engine in gear.
+    """The paths in a gear with the clutch closed, or a torque converter locked.
+
+    DataError where the car has no such gear, or no engine in gear.
 
     Where machines have gears of their own, those in which they add most force at the speed.
     """
@@ -151,7 +153,8 @@ def _rigid(found: Way, joints: tuple[Joint, ...], engine: str) -> set[str]:
     fixed = [
         set(joint.reaction)
         for use, joint in zip(found.uses, joints, strict=True)
-        if not (isinstance(use.part, Clutch) and use.part.operation == "driver")
+        if not isinstance(use.part, TorqueConverter)
+        and not (isinstance(use.part, Clutch) and use.part.operation == "driver")
     ]
     reached = {engine}
     for _ in fixed:

@@ -18,6 +18,7 @@ from hevopt.powertrain.operation import Setting, setting
 from hevopt.powertrain.packing import packed
 from hevopt.powertrain.phases import Driver, Stretch, driver_of, stretches
 from hevopt.powertrain.rejects import Bits, bits
+from hevopt.powertrain.turbine import turbine_most_nm
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.battery import within_limits
 from hevopt.problem.reject import Reject
@@ -154,7 +155,14 @@ def deliverable_nm(car: Architecture, branch: Branch, stuck: Flags) -> Array:
         np.maximum.at(result, *most_nm(points, stuck))
     for piece in () if branch.points else branch.driven.pieces:
         here = piece.here
-        if here.way.slack is not None:
+        if here.way.converter is not None and here.way.converter.second in here.way.shafts:
+            state = np.flatnonzero(stuck[here.shafts.step])
+            part = setting(car, here.way, here.shafts.picked(state))
+            follows = car.driveline.follows_load
+            result[part.shafts.step] = turbine_most_nm(
+                part, Setting.idle_nm if follows else _most_nm
+            )
+        elif here.way.slack is not None:
             names = {*here.way.chosen, here.way.slack}
             given = {name: _most_nm(here, name)[:, None] for name in names}
             if car.driveline.follows_load:

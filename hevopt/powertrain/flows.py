@@ -129,6 +129,8 @@ class PowerFlows(Flows):
         found = _flows(here, torques)
         for loss in ("clutch", "gearbox", "gear"):
             found[f"{loss}_loss_w"] = np.zeros((1, 1))
+        if here.shafts.slip is not None:
+            found["clutch_loss_w"] = here.shafts.slip.heat_w[:, None]
         for joint in joints_of(here.way):
             entering_w = joints[joint.name] * here.torques.sense_radps(joint)[:, None]
             name = f"{joint.loss}_loss_w"

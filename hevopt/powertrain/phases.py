@@ -4,6 +4,7 @@ The driver's clutch, for a turning engine, at a listed gear:
     locked     the gearbox input turns at or above the launch speed: engine and input turn as one
     slipping   below it while driving: the engine holds the launch speed, the torque passes, the slip is lost
     open       braking below idle, listed `clutch_open` while braking; with the engine at rest always
+A torque converter has no clutch to open: it is locked where its file says so, and slips else.
 Standing, gearboxes are in neutral, so that the engine can turn what lies between.
 """
 
@@ -21,6 +22,7 @@ from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.driving.driver import gap_shares, launch_speed_radps
 from hevopt.powertrain.shafts import Shafts, shafts_of
+from hevopt.powertrain.turbine import slipped
 from hevopt.problem.arrays import Array, Flags, Indices
 
 
@@ -69,12 +71,15 @@ def stretches(car: Architecture, driver: Driver, state: State) -> list[Stretch]:
                 found = way(car.driveline, state, phase._replace(opened=opened))
                 if found.tied and not state.engine_on and car.driveline.engine in found.shafts:
                     continue  # an engine that the wheels turn is not at rest
-                key = (found.uses, tuple(found.held.items()), found.chosen, found.slack)
+                held = tuple(found.held.items())
+                key = (found.uses, held, found.chosen, found.slack, found.converter)
                 merged.setdefault(key, (found, []))[1].append(part)
     result = []
     for found, parts in merged.values():
         step = np.sort(np.concatenate(parts))
         shafts = shafts_of(car, driver.demand, found, step, driver.launch_radps)
+        if found.converter is not None:
+            shafts = slipped(found, shafts, car.engine.idle_radps)
         if any(use.gear is None for use in found.uses):
             shafts = replace(shafts, gap=driver.gap[step])
         result.append(Stretch(found, step, shafts))
@@ -96,16 +101,30 @@ def _phases(
         listed = ~standing & np.isin(demand.gear, box.gears)
         neutral = neutral & ~listed
         open_here = listed
-        if engine_on and car.driveline.driver_clutches:
+        if engine_on and (car.driveline.driver_clutches or car.driveline.converter is not None):
             input_radps = np.array(box.ratios)[demand.gear] * demand.wheel_speed_radps
-            locked = listed & ~apart & (input_radps >= launch_radps)
-            slipping = listed & driving & (input_radps < launch_radps)
+            if car.driveline.converter is not None:
+                locked = listed & _locks(car, demand.gear, input_radps)
+                slipping = listed & ~locked
+            else:
+                locked = listed & ~apart & (input_radps >= launch_radps)
+                slipping = listed & driving & (input_radps < launch_radps)
             open_here = listed & ~locked & ~slipping
             phases.append((Phase(False, "closed", box.name), locked))
             phases.append((Phase(False, "slipping", box.name), slipping))
         phases.append((Phase(False, "open", box.name), open_here))
     phases.append((Phase(False), neutral))
     return phases
+
+
+def _locks(car: Architecture, gear: Indices, input_radps: Array) -> Flags:
+    """(time,) where a torque converter is locked: never below idle speed."""
+    part = car.driveline.converter
+    assert part is not None  # asked for where there is one
+    data = part.data
+    least = max(data.lock_up_radps, car.engine.idle_radps)
+    locks: Flags = (gear >= data.lock_up_gear) & (input_radps >= least)
+    return locks
 
 
 def _possible(car: Architecture, driver: Driver, state: State) -> Flags:
@@ -121,6 +140,9 @@ def _possible(car: Architecture, driver: Driver, state: State) -> Flags:
         # Above first gear the clutch does not slip, and the engine keeps its lowest speed.
         driving = demand.wheel_torque_nm > 0
         speed = car.gearbox.ratios[demand.gear] * demand.wheel_speed_radps
+        if car.driveline.converter is not None:
+            locked = moving & _locks(car, demand.gear, speed)
+            return possible & ~(locked & (speed < car.gearbox.engine_speed_min_radps))
         locked = moving & ~(demand.clutch_open & ~driving) & (speed >= launch_radps)
         slow = locked & (speed < car.gearbox.engine_speed_min_radps)
         slips = moving & driving & (speed < launch_radps)

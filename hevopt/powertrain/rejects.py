@@ -36,7 +36,9 @@ def limit_rejects(here: Setting, torques: Mapping[str, Array]) -> Bits:
             | bits(Reject.MACHINE_SPEED, speed > machine.speed_max_radps)
         )
     wanted, brake = here.shafts.wheel_nm[:, None], torques[BRAKE]
-    unmet = np.where(wanted > 0, np.abs(brake), brake) > 10 * tolerance
+    # A torque converter may creep: the driver holds against it by the brakes.
+    creeps = here.way.converter is not None
+    unmet = np.where((wanted > 0) & (not creeps), np.abs(brake), brake) > 10 * tolerance
     if not _standing(here).all():
         found = found | bits(Reject.NO_PATH, ~_standing(here)[:, None] & unmet)
     for joint in joints_of(here.way):

@@ -17,13 +17,28 @@ from hevopt.problem.arrays import Array, Indices
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Slip(Shown):
+    """A torque converter, (state,): what its impeller takes, its turbine gives, and the power turned into heat."""
+
+    impeller_nm: Array
+    turbine_nm: Array
+    heat_w: Array
+
+    def picked(self, state: Indices) -> "Slip":
+        """Those of some states."""
+        return Slip(self.impeller_nm[state], self.turbine_nm[state], self.heat_w[state])
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Shafts(Shown):
     """Speeds at the steps of a way; every array (state,), a state being a step, or one of its speeds to choose.
 
     step, gear: index and listed gear of each state's step; wheel_nm: torque that the wheels ask for
-    acting_nm: shaft -> torque that its inertia takes, and on the wheels also what they ask for; none where it is 0
+    acting_nm: shaft -> torque that its inertia takes, and on the wheels also what they ask for, on a torque
+    converter's what that takes less what it gives; none where it is 0
     gap: share of the step without torque through the listed gearbox; load_w: electric load
     inertia_w: power that the inertia of the engine takes, and that of all machines
+    slip: what a torque converter does that slips; None where none does
     """
 
     step: Indices
@@ -35,6 +50,7 @@ class Shafts(Shown):
     wheel_nm: Array
     gap: Array
     load_w: Array
+    slip: Slip | None = None
 
     def at(self, coefficient: Coefficient) -> Coefficient:
         """A coefficient in the gear of each state."""
@@ -57,6 +73,7 @@ class Shafts(Shown):
             wheel_nm=self.wheel_nm[state],
             gap=self.gap[state],
             load_w=self.load_w[state],
+            slip=None if self.slip is None else self.slip.picked(state),
         )
 
 
@@ -68,7 +85,10 @@ def shafts_of(
     launch_radps: Array,
     free_radps: Array | None = None,
 ) -> Shafts:
-    """The shafts at some steps, (state,); free_radps: (state,) engine speed where it is a choice."""
+    """The shafts at some steps, (state,); free_radps: (state,) engine speed where it is a choice.
+
+    Where a torque converter slips the engine idles here; `slipped` makes it turn as fast as torques ask for.
+    """
     gear, ratios = demand.gear[step], speeds_of(way)
     inputs = {WHEEL: demand.wheel_speed_radps[step]}
     idle = np.full(step.shape, car.engine.idle_radps)
@@ -76,6 +96,7 @@ def shafts_of(
         "rest": np.zeros(step.shape),
         "idle": idle,
         "launch": launch_radps[step],
+        "impeller": idle,
         "free": idle if free_radps is None else free_radps,
     }
     inputs |= {shaft: held[how] for shaft, how in way.held.items()}

@@ -13,6 +13,7 @@ from hevopt.car.parts import (
     Part,
     Planetary,
     ShaftBrake,
+    TorqueConverter,
 )
 from hevopt.driving.cycle import Cycle
 from hevopt.pages.comparison.saved_car import (
@@ -31,6 +32,7 @@ _KINDS: dict[type[Part], PartKind] = {
     OneWayClutch: "one-way clutch",
     Planetary: "planetary set",
     ShaftBrake: "shaft brake",
+    TorqueConverter: "torque converter",
 }
 _CHOICES = {"listed": "", "free": ", chosen", "preselected": ""}
 
@@ -84,6 +86,8 @@ def _note(part: Part) -> str:
         return f"{part.ratio:.3g} : 1"
     if isinstance(part, Planetary):
         return f"ring/sun {part.ratio:.3g}"
+    if isinstance(part, TorqueConverter):
+        return "locks" if np.isfinite(part.data.lock_up_radps) else "never locks"
     if isinstance(part, Clutch):
         return "driver's" if part.operation == "driver" else "chosen"
     return "to the case" if isinstance(part, OneWayClutch) and part.second is None else ""

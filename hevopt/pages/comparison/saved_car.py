@@ -12,7 +12,15 @@ Number = Annotated[float, Field(ge=-_NUMBER_MAX, le=_NUMBER_MAX)]
 Whole = Annotated[int, Field(ge=-(2**53), le=2**53)]
 # More would be no driveline that a sketch could show.
 _PARTS_MAX = 100
-PartKind = Literal["gear", "gearbox", "clutch", "one-way clutch", "planetary set", "shaft brake"]
+PartKind = Literal[
+    "gear",
+    "gearbox",
+    "clutch",
+    "one-way clutch",
+    "planetary set",
+    "shaft brake",
+    "torque converter",
+]
 GearSource = Literal["cycle", "shift speeds", "plan", "none"]
 
 

@@ -19,8 +19,8 @@ _HALF, _BELOW = 50, 40
 _LETTERS_MAX = 17
 _OVERHANG = 13
 IconKind = Literal[
-    "gear", "gearbox", "clutch", "one-way clutch", "planetary set", "shaft brake", "engine", "machine", "battery",
-    "wheels",
+    "gear", "gearbox", "clutch", "one-way clutch", "planetary set", "shaft brake", "torque converter", "engine",
+    "machine", "battery", "wheels",
 ]  # fmt: skip
 
 
