@@ -27,7 +27,7 @@ FLOORS = [
     ["driving", "car_files", "strategies"],
     ["powertrain", "measured", "gym"],
     ["forward"],
-    ["studies", "tipin"],
+    ["studies", "tipin", "fmu"],
     ["reproduction", "sweeps"],
     ["sizing"],
     ["output", "checks"],

@@ -204,7 +204,7 @@ def _table_lines(
             allowed = f"shipped: {', '.join(_shipped_components(key)) or 'none'}"
         said = f"{meaning}{f' ({unit})' if unit.strip('-') else ''}; {allowed}"
         if key not in contents:
-            default = f", by default {_toml(shape['default'])}" if "default" in shape else ""
+            default = f", by default {toml_value(shape['default'])}" if "default" in shape else ""
             lines += _comment(f"Not given{default}: {key}: {said}")
             if key == "scale":
                 lines.append(f"{_OURS} scale = {_EXAMPLES[model]}")
@@ -220,7 +220,7 @@ def _table_lines(
             sections += ["", *above, *_comment(said), f"[{'.'.join(path)}]{beside}"]
             sections += _table_lines(inner, value, notes, path, tables)
         else:
-            lines += [*above, *_comment(said), f"{key} = {_toml(value)}{beside}"]
+            lines += [*above, *_comment(said), f"{key} = {toml_value(value)}{beside}"]
     return lines + sections
 
 
@@ -239,13 +239,13 @@ def _comment(text: str) -> list[str]:
     return [f"{_OURS} {line}" for line in textwrap.wrap(text, _WIDTH - 3)]
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """A value as TOML, long lists over several lines."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(k)} = {toml_value(v)}" for k, v in value.items()) + " }"
     if not isinstance(value, list):
         return str(tomlkit.item(value).as_string())
-    inner = [_toml(entry) for entry in value]
+    inner = [toml_value(entry) for entry in value]
     if any(isinstance(entry, list | Mapping) for entry in value):
         return "[\n" + "".join(f"  {row},\n" for row in inner) + "]"
     text = ", ".join(inner)

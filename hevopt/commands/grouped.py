@@ -32,6 +32,7 @@ GROUPS: Sequence[HelpGroup] = (
             "drive": "hevopt drive C2 --strategy conventional",
             "performance": "hevopt performance C2",
             "tipin": "hevopt tipin",
+            "fmu": "hevopt fmu C2 --out c2.fmu",
         },
     ),
     HelpGroup(

@@ -54,13 +54,20 @@ class Turning(Shown):
         return (values[..., 1:] + values[..., :-1]) / 2
 
 
-def turning_of(line: Line, record: Array, start: tuple[float, float], radius_m: float) -> Turning:
-    """Speeds of wheels, engine's side and all units; start: speed of the car and of the engine's side."""
+def turning_of(
+    line: Line, record: Array, start: tuple[float, float], radius_m: float, before: Array | None
+) -> Turning:
+    """Speeds of wheels, engine's side and all units; start: speed of the car and of the engine's side.
+
+    before: as of books_of
+    """
     wheel = np.append(start[0], record[:, col.SPEED]) / radius_m
     side = np.append(start[1], record[:, col.SIDE])
-    way = record[:, col.WAY].astype(np.int64)
-    way, from_way = np.append(way[0], way), np.append(way[0], record[:, col.FROM_WAY].astype(int))
-    blend = np.append(0.0, record[:, col.BLEND])[:, None]
+    at_start = record[:1, [col.WAY, col.WAY, col.BLEND]] * [1, 1, 0]
+    if before is not None:
+        at_start = before[None, [col.WAY, col.FROM_WAY, col.BLEND]]
+    moved = np.vstack([at_start, record[:, [col.WAY, col.FROM_WAY, col.BLEND]]])
+    way, from_way, blend = moved[:, 0].astype(int), moved[:, 1].astype(int), moved[:, 2:]
     by_wheel, by_side = (
         (rate[way] + blend * (rate[from_way] - rate[way])).T
         for rate in (line.ways.wheel, line.ways.side)
@@ -70,14 +77,15 @@ def turning_of(line: Line, record: Array, start: tuple[float, float], radius_m: 
 
 def books_of(
     car: Architecture, line: Line, record: Array, start: tuple[float, float, float], step_s: float,
-    load_w: Array, breath: Array | None = None,
+    load_w: Array, breath: Array | None = None, before: Array | None = None,
 ) -> Books:  # fmt: skip
     """The books of a run; start: the car's speed, the engine side's and stored energy before the first step.
 
     load_w: (step,) electric load
     breath: (step, column) of a mean-value engine, see _breathing_kernels, whose fuel counts
+    before: (column,) what the step before the first recorded; None where the car begins in its gear
     """
-    turning = turning_of(line, record, start[:2], car.vehicle.tyre_radius_m)
+    turning = turning_of(line, record, start[:2], car.vehicle.tyre_radius_m, before)
     mean = turning.mean
     w, n, units = mean(turning.wheel), mean(turning.side), mean(turning.units)
     inertia = line.ways.inertia_kgm2[:, None] * np.diff(turning.units**2, axis=1) / (2 * step_s)

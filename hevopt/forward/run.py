@@ -230,7 +230,7 @@ def run_of(
     load_w = task.load_w[np.where(rests, 0, 1), np.minimum(at, task.load_w.shape[1] - 1)]
     start = start_mps, side, float(planned_j[0])
     books = books_of(car, line, record, start, step_s, load_w, breath)
-    _check_charge(car, books, time_s)
+    check_charge(car, books, time_s)
     speed = np.append(start_mps, record[:, col.SPEED])
     wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)
     phase = record[:, col.PHASE].astype(np.int64)
@@ -246,19 +246,25 @@ def run_of(
 
 
 def _check(cycle: Cycle, step_s: float, handling: Handling) -> None:
-    low, high = STEP_RANGE_S
-    if not low <= step_s <= high:
-        raise DataError(f"step {step_s:g} s; allowed: {low:g} to {high:g} s")
+    check_step(step_s, handling)
     if cycle.duration_s / step_s > STEPS_MAX:
         raise DataError(
             f"cycle {cycle.name}: {cycle.duration_s / step_s:.3g} steps of {step_s:g} s; allowed: {STEPS_MAX:g}; "
             "choose a longer step"
         )
+
+
+def check_step(step_s: float, handling: Handling) -> None:
+    """DataError for a step or a figure out of range, and for gains that do not go with the step."""
+    low, high = STEP_RANGE_S
+    if not low <= step_s <= high:  # nor NaN
+        raise DataError(f"step {step_s:g} s; allowed: {low:g} to {high:g} s")
     handling.check()
     check_gains(handling.driver, handling.tyre, step_s)
 
 
-def _check_charge(car: Architecture, books: Books, time_s: Array) -> None:
+def check_charge(car: Architecture, books: Books, time_s: Array) -> None:
+    """DataError where the battery is empty; time_s: (step + 1,)."""
     lost = ~np.isfinite(books.energy_j) & ~books.off_map.any()
     lost |= books.energy_j < 0
     if lost.any():

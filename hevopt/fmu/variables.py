@@ -1,0 +1,155 @@
+"""What a unit takes and tells: names, units of FMI, start values and meanings."""
+
+from collections.abc import Callable, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.forward.commanded import CommandedCar, Moved
+from hevopt.forward.run import STEP_RANGE_S
+
+# Unit of FMI -> exponents of the base units of the SI, as the standard wants them told.
+UNITS: dict[str, dict[str, int]] = {
+    "1": {},
+    "s": {"s": 1},
+    "m": {"m": 1},
+    "kg": {"kg": 1},
+    "m/s": {"m": 1, "s": -1},
+    "m/s2": {"m": 1, "s": -2},
+    "rad/s": {"rad": 1, "s": -1},
+    "kg/s": {"kg": 1, "s": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N.m": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "J": {"kg": 1, "m": 2, "s": -2},
+}
+Kind = Literal["real", "integer", "boolean"]
+
+
+class Given(NamedTuple):
+    """A parameter or an input; start: without it; low, high: what it may be."""
+
+    name: str
+    kind: Kind
+    unit: str
+    start: float | int | bool
+    low: float | None
+    high: float | None
+    meaning: str
+
+
+class Told(NamedTuple):
+    """An output: of the car after the steps, and of what they did, which is None before the first."""
+
+    name: str
+    kind: Kind
+    unit: str
+    meaning: str
+    value: Callable[[CommandedCar, Moved | None], float]
+
+
+def parameters_of(car: Architecture, step_s: float) -> list[Given]:
+    """What is fixed before the first step."""
+    pack = car.battery
+    return [
+        Given("step_s", "real", "s", step_s, *STEP_RANGE_S,
+              "the unit's own step; a communication step is a whole number of them"),
+        Given("soc_start", "real", "1", car.soc_start, pack.soc_min, pack.soc_max,
+              "state of charge at the start"),
+        Given("speed_start_mps", "real", "m/s", 0.0, 0.0, 100.0, "speed at the start"),
+    ]  # fmt: skip
+
+
+def gear_names(one: CommandedCar) -> dict[str, str]:
+    """Input -> gearbox whose gear is chosen beside the listed one."""
+    return {f"{box.replace(' ', '_')}_gear_asked": box for box, _ in one.line.keys[0][1]}
+
+
+def inputs_of(one: CommandedCar) -> list[Given]:
+    """What may change from step to step; of a car without an engine, or whose machine obeys nobody, less."""
+    car, gears = one.car, sorted(set(one.line.gears.tolist()))
+    found = [
+        Given("force_asked_n", "real", "N", 0.0, None, None,
+              "force at the driven tyres that the driver asks for; below 0 braking"),
+        Given("hold", "boolean", "", False, None, None,
+              "brakes hold the car where it stands, and the clutch is open"),
+        Given("grade", "real", "1", 0.0, None, None, "slope of the road, rise over run"),
+    ]  # fmt: skip
+    if len(gears) > 1:
+        found.append(Given("gear_asked", "integer", "", gears[0], gears[0], gears[-1],
+                           "gear that is asked for"))  # fmt: skip
+    for name, box in gear_names(one).items():
+        of_box = sorted({gear for _, chosen, _ in one.line.keys for b, gear in chosen if b == box})
+        found.append(Given(name, "integer", "", of_box[0], of_box[0], of_box[-1],
+                           f"gear of the {box}, chosen beside the listed one"))  # fmt: skip
+    if not car.electric:
+        found += [
+            Given("engine_on", "boolean", "", True, None, None,
+                  "the engine is to turn; it is started and stopped by the unit"),
+            Given("clutch_open", "boolean", "", False, None, None, "the driver's clutch is open"),
+        ]  # fmt: skip
+        if not car.driveline.follows_load:
+            found.append(Given("machine_asked_nm", "real", "N.m", 0.0, None, None,
+                               "torque of the machine while the engine drives, which gives the rest of the "
+                               "force; else the machine gives it all"))  # fmt: skip
+    return found
+
+
+def _mean(flow: str) -> Callable[[CommandedCar, Moved | None], float]:
+    def value(one: CommandedCar, moved: Moved | None) -> float:
+        return 0.0 if moved is None else float(np.mean(moved.books.flows[flow]))
+
+    return value
+
+
+def _acceleration(one: CommandedCar, moved: Moved | None) -> float:
+    if moved is None:
+        return 0.0
+    kinetic, speed = (moved.books.flows[name] for name in ("kinetic_w", "speed_mps"))
+    forces = np.divide(kinetic, speed, out=np.zeros_like(speed), where=speed > 0)
+    return float(np.mean(forces)) / one.car.vehicle.equivalent_mass_kg
+
+
+def _unbalanced(one: CommandedCar, moved: Moved | None) -> float:
+    return (
+        0.0
+        if moved is None
+        else sum(float(np.mean(np.abs(r))) for r in moved.books.residuals.values())
+    )
+
+
+OUTPUTS: Sequence[Told] = (
+    Told("speed_mps", "real", "m/s", "speed of the car", lambda one, _: one.speed_mps),
+    Told("acceleration_mps2", "real", "m/s2", "acceleration of the car, mean of the step", _acceleration),
+    Told("distance_m", "real", "m", "distance driven", lambda one, _: one.standing.distance_m),
+    Told("soc", "real", "1", "state of charge", lambda one, _: one.soc),
+    Told("stored_j", "real", "J", "energy stored in the battery", lambda one, _: one.standing.stored_j),
+    Told("fuel_kg", "real", "kg", "fuel burnt, starts included", lambda one, _: one.standing.fuel_kg),
+    Told("nox_kg", "real", "kg", "NOx emitted", lambda one, _: one.standing.nox_kg),
+    Told("fuel_kgps", "real", "kg/s", "fuel rate, without that of starts", _mean("fuel_kgps")),
+    Told("nox_kgps", "real", "kg/s", "NOx rate", _mean("nox_kgps")),
+    Told("engine_side_radps", "real", "rad/s", "speed of the engine", lambda one, _: one.side_radps),
+    Told("engine_torque_nm", "real", "N.m", "torque of the engine", _mean("engine_torque_nm")),
+    Told("machine_speed_radps", "real", "rad/s", "speed of the machine", _mean("machine_speed_radps")),
+    Told("machine_torque_nm", "real", "N.m", "torque of the machine, braking below 0",
+         _mean("machine_torque_nm")),
+    Told("clutch_torque_nm", "real", "N.m", "torque through the clutch", _mean("clutch_torque_nm")),
+    Told("clutch_loss_w", "real", "W", "power lost in the clutch", _mean("clutch_loss_w")),
+    Told("brake_power_w", "real", "W", "power of the brakes", _mean("brake_power_w")),
+    Told("wheel_power_w", "real", "W", "power of the driveline at the wheels, brakes deducted",
+         _mean("wheel_power_w")),
+    Told("road_w", "real", "W", "power of rolling, air and slope", _mean("road_w")),
+    Told("machine_electric_w", "real", "W", "electric power of the machine", _mean("machine_electric_w")),
+    Told("battery_power_w", "real", "W", "power at the battery's terminals, > 0 out of it",
+         _mean("battery_power_w")),
+    Told("unbalanced_w", "real", "W", "power that does not add up, of all components: rounding", _unbalanced),
+    Told("gear", "integer", "", "gear that is in, or being changed to; 0 before the first step",
+         lambda one, moved: 0 if moved is None else moved.gear),
+    Told("engine_phase", "integer", "", "0 at rest, 1 started, 2 turning, 3 stopped",
+         lambda one, moved: 0 if moved is None else moved.engine),
+    Told("full", "boolean", "", "engine and machine give all they may, and it is less than asked",
+         lambda one, moved: moved is not None and moved.full),
+    Told("off_map", "boolean", "", "a measured map has ended: fuel or charge are not known",
+         lambda one, moved: moved is not None and bool(moved.books.off_map.any())),
+)  # fmt: skip
