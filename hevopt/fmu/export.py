@@ -136,7 +136,8 @@ def _described(slave: Fmi2Slave, one: CommandedCar, step_s: float) -> bytes:
             if value is not None:
                 kind.set(name, str(value))
     ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    described: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return described
 
 
 def _child(root: Element, tag: str) -> Element:

@@ -193,7 +193,7 @@ class CommandedCar:
         load_w = self._loads_w[np.where(phase == motor.REST, 0, 1), 0]
         books = books_of(self.car, self.line, record, start, self.step_s, load_w, before=before.row)
         if np.isfinite(before.stored_j):  # else a measured map has ended on the way
-            times = self.step_s * (before.steps + np.arange(len(record) + 1))
+            times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
             check_charge(self.car, books, times)
         starting = phase == motor.STARTING
         was = before.row is not None and before.row[col.PHASE] == motor.STARTING
