@@ -10,7 +10,7 @@ from hevopt.car_files.load import load_architecture
 from hevopt.car_files.whole import ARCHITECTURE
 from hevopt.errors import DataError, HevoptError
 from hevopt.fmu.variables import OUTPUTS, Given, gear_names, inputs_of, parameters_of
-from hevopt.forward.commanded import CommandedCar, Commands, Moved
+from hevopt.forward.commanded import CommandedCar, Commands, CommandedSteps
 
 CAR_FOLDER, STEP_FILE = "car", "step_s.txt"
 _TYPES = {"real": Real, "integer": Integer, "boolean": Boolean}
@@ -44,7 +44,7 @@ class CarSlave(Fmi2Slave):  # type: ignore[misc]
         self.modelName = f"hevopt_{''.join(c if c.isalnum() else '_' for c in self._car.name)}"
         self.description = f"{self._car.name}, driven: {self._car.description}"
         self._one = CommandedCar(self._car, step_s=step_s)
-        self._moved: Moved | None = None
+        self._moved: CommandedSteps | None = None
         self._fault: str | None = None
         self._gears = gear_names(self._one)
         parameters = parameters_of(self._car, step_s)

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.forward.commanded import CommandedCar, Moved
+from hevopt.forward.commanded import CommandedCar, CommandedSteps
 from hevopt.forward.run import STEP_RANGE_S
 
 # Unit of FMI -> exponents of the base units of the SI, as the standard wants them told.
@@ -39,14 +39,14 @@ class Given(NamedTuple):
     meaning: str
 
 
-class Told(NamedTuple):
+class UnitOutput(NamedTuple):
     """An output: of the car after the steps, and of what they did, which is None before the first."""
 
     name: str
     kind: Kind
     unit: str
     meaning: str
-    value: Callable[[CommandedCar, Moved | None], float]
+    value: Callable[[CommandedCar, CommandedSteps | None], float]
 
 
 def parameters_of(car: Architecture, step_s: float) -> list[Given]:
@@ -96,14 +96,14 @@ def inputs_of(one: CommandedCar) -> list[Given]:
     return found
 
 
-def _mean(flow: str) -> Callable[[CommandedCar, Moved | None], float]:
-    def value(one: CommandedCar, moved: Moved | None) -> float:
+def _mean(flow: str) -> Callable[[CommandedCar, CommandedSteps | None], float]:
+    def value(one: CommandedCar, moved: CommandedSteps | None) -> float:
         return 0.0 if moved is None else float(np.mean(moved.books.flows[flow]))
 
     return value
 
 
-def _acceleration(one: CommandedCar, moved: Moved | None) -> float:
+def _acceleration(one: CommandedCar, moved: CommandedSteps | None) -> float:
     if moved is None:
         return 0.0
     kinetic, speed = (moved.books.flows[name] for name in ("kinetic_w", "speed_mps"))
@@ -111,7 +111,7 @@ def _acceleration(one: CommandedCar, moved: Moved | None) -> float:
     return float(np.mean(forces)) / one.car.vehicle.equivalent_mass_kg
 
 
-def _unbalanced(one: CommandedCar, moved: Moved | None) -> float:
+def _unbalanced(one: CommandedCar, moved: CommandedSteps | None) -> float:
     return (
         0.0
         if moved is None
@@ -119,37 +119,37 @@ def _unbalanced(one: CommandedCar, moved: Moved | None) -> float:
     )
 
 
-OUTPUTS: Sequence[Told] = (
-    Told("speed_mps", "real", "m/s", "speed of the car", lambda one, _: one.speed_mps),
-    Told("acceleration_mps2", "real", "m/s2", "acceleration of the car, mean of the step", _acceleration),
-    Told("distance_m", "real", "m", "distance driven", lambda one, _: one.standing.distance_m),
-    Told("soc", "real", "1", "state of charge", lambda one, _: one.soc),
-    Told("stored_j", "real", "J", "energy stored in the battery", lambda one, _: one.standing.stored_j),
-    Told("fuel_kg", "real", "kg", "fuel burnt, starts included", lambda one, _: one.standing.fuel_kg),
-    Told("nox_kg", "real", "kg", "NOx emitted", lambda one, _: one.standing.nox_kg),
-    Told("fuel_kgps", "real", "kg/s", "fuel rate, without that of starts", _mean("fuel_kgps")),
-    Told("nox_kgps", "real", "kg/s", "NOx rate", _mean("nox_kgps")),
-    Told("engine_side_radps", "real", "rad/s", "speed of the engine", lambda one, _: one.side_radps),
-    Told("engine_torque_nm", "real", "N.m", "torque of the engine", _mean("engine_torque_nm")),
-    Told("machine_speed_radps", "real", "rad/s", "speed of the machine", _mean("machine_speed_radps")),
-    Told("machine_torque_nm", "real", "N.m", "torque of the machine, braking below 0",
+OUTPUTS: Sequence[UnitOutput] = (
+    UnitOutput("speed_mps", "real", "m/s", "speed of the car", lambda one, _: one.speed_mps),
+    UnitOutput("acceleration_mps2", "real", "m/s2", "acceleration of the car, mean of the step", _acceleration),
+    UnitOutput("distance_m", "real", "m", "distance driven", lambda one, _: one.standing.distance_m),
+    UnitOutput("soc", "real", "1", "state of charge", lambda one, _: one.soc),
+    UnitOutput("stored_j", "real", "J", "energy stored in the battery", lambda one, _: one.standing.stored_j),
+    UnitOutput("fuel_kg", "real", "kg", "fuel burnt, starts included", lambda one, _: one.standing.fuel_kg),
+    UnitOutput("nox_kg", "real", "kg", "NOx emitted", lambda one, _: one.standing.nox_kg),
+    UnitOutput("fuel_kgps", "real", "kg/s", "fuel rate, without that of starts", _mean("fuel_kgps")),
+    UnitOutput("nox_kgps", "real", "kg/s", "NOx rate", _mean("nox_kgps")),
+    UnitOutput("engine_side_radps", "real", "rad/s", "speed of the engine", lambda one, _: one.side_radps),
+    UnitOutput("engine_torque_nm", "real", "N.m", "torque of the engine", _mean("engine_torque_nm")),
+    UnitOutput("machine_speed_radps", "real", "rad/s", "speed of the machine", _mean("machine_speed_radps")),
+    UnitOutput("machine_torque_nm", "real", "N.m", "torque of the machine, braking below 0",
          _mean("machine_torque_nm")),
-    Told("clutch_torque_nm", "real", "N.m", "torque through the clutch", _mean("clutch_torque_nm")),
-    Told("clutch_loss_w", "real", "W", "power lost in the clutch", _mean("clutch_loss_w")),
-    Told("brake_power_w", "real", "W", "power of the brakes", _mean("brake_power_w")),
-    Told("wheel_power_w", "real", "W", "power of the driveline at the wheels, brakes deducted",
+    UnitOutput("clutch_torque_nm", "real", "N.m", "torque through the clutch", _mean("clutch_torque_nm")),
+    UnitOutput("clutch_loss_w", "real", "W", "power lost in the clutch", _mean("clutch_loss_w")),
+    UnitOutput("brake_power_w", "real", "W", "power of the brakes", _mean("brake_power_w")),
+    UnitOutput("wheel_power_w", "real", "W", "power of the driveline at the wheels, brakes deducted",
          _mean("wheel_power_w")),
-    Told("road_w", "real", "W", "power of rolling, air and slope", _mean("road_w")),
-    Told("machine_electric_w", "real", "W", "electric power of the machine", _mean("machine_electric_w")),
-    Told("battery_power_w", "real", "W", "power at the battery's terminals, > 0 out of it",
+    UnitOutput("road_w", "real", "W", "power of rolling, air and slope", _mean("road_w")),
+    UnitOutput("machine_electric_w", "real", "W", "electric power of the machine", _mean("machine_electric_w")),
+    UnitOutput("battery_power_w", "real", "W", "power at the battery's terminals, > 0 out of it",
          _mean("battery_power_w")),
-    Told("unbalanced_w", "real", "W", "power that does not add up, of all components: rounding", _unbalanced),
-    Told("gear", "integer", "", "gear that is in, or being changed to; 0 before the first step",
+    UnitOutput("unbalanced_w", "real", "W", "power that does not add up, of all components: rounding", _unbalanced),
+    UnitOutput("gear", "integer", "", "gear that is in, or being changed to; 0 before the first step",
          lambda one, moved: 0 if moved is None else moved.gear),
-    Told("engine_phase", "integer", "", "0 at rest, 1 started, 2 turning, 3 stopped",
+    UnitOutput("engine_phase", "integer", "", "0 at rest, 1 started, 2 turning, 3 stopped",
          lambda one, moved: 0 if moved is None else moved.engine),
-    Told("full", "boolean", "", "engine and machine give all they may, and it is less than asked",
+    UnitOutput("full", "boolean", "", "engine and machine give all they may, and it is less than asked",
          lambda one, moved: moved is not None and moved.full),
-    Told("off_map", "boolean", "", "a measured map has ended: fuel or charge are not known",
+    UnitOutput("off_map", "boolean", "", "a measured map has ended: fuel or charge are not known",
          lambda one, moved: moved is not None and bool(moved.books.off_map.any())),
 )  # fmt: skip

@@ -66,7 +66,7 @@ class Standing(NamedTuple):
     nox_kg: float
 
 
-class Moved(NamedTuple):
+class CommandedSteps(NamedTuple):
     """What some steps have done; record: (step, column) of _drive_kernels; books: of the same steps."""
 
     record: Array
@@ -127,7 +127,7 @@ class CommandedCar:
         """State of charge."""
         return float(soc(self.car.battery, self.standing.stored_j))
 
-    def advance(self, commands: Commands, steps: int = 1) -> Moved:
+    def advance(self, commands: Commands, steps: int = 1) -> CommandedSteps:
         """The car after some steps under the same commands; DataError for a command that is none, and where the
         battery is empty: the car is then as it was before."""
         before, task = self.standing, self._task(commands)
@@ -150,7 +150,7 @@ class CommandedCar:
             before.nox_kg + float(np.nansum(flows["nox_kgps"])) * self.step_s,
         )  # fmt: skip
         gear = int(self.line.gears[int(record[-1, col.WAY])])
-        return Moved(
+        return CommandedSteps(
             record, books, gear, int(record[-1, col.PHASE]), bool(record[:, col.FULL].any())
         )
 
