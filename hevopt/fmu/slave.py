@@ -10,7 +10,7 @@ from hevopt.car_files.load import load_architecture
 from hevopt.car_files.whole import ARCHITECTURE
 from hevopt.errors import DataError, HevoptError
 from hevopt.fmu.variables import OUTPUTS, Given, gear_names, inputs_of, parameters_of
-from hevopt.forward.commanded import CommandedCar, Commands, CommandedSteps
+from hevopt.forward.commanded import CommandedCar, CommandedSteps, Commands
 
 CAR_FOLDER, STEP_FILE = "car", "step_s.txt"
 _TYPES = {"real": Real, "integer": Integer, "boolean": Boolean}
