@@ -163,7 +163,7 @@ def by_prices(t, b, proof):
     before, steps = np.append(price[0], price[:-1]), len(price)
     even = b.energy(np.linspace(*b.at(b.ends)[3], CELLS + 1))[1:-1]
     edges = np.union1d(np.clip(np.append(even, b.stored), b.low, b.high), b.ends)
-    cells = b.least(edges)
+    cells, top = b.least(edges), b.least(b.ends)
     volt, *ohms = b.at(edges)[:3]
     over = volt**2 - np.interp(edges, b.ends, volt[[0, -1]] ** 2)
     line = None
@@ -182,7 +182,7 @@ def by_prices(t, b, proof):
             y = np.clip(b.start - taken[t["start_mode"]][mode], b.low, b.high)
             worth = after * b.drain(power, *b.at(y)[:3])[0]
         elif line:
-            worth = line.worth(power, after, tilt)
+            worth = line.worth(power, after, tilt) if tilt else after * b.drain(power, *top)[0]
         else:
             rate = b.drain(power[:, None], *(part[None] for part in cells))[0]
             rate = np.where(np.isfinite(rate), after * rate, np.inf)
@@ -190,7 +190,7 @@ def by_prices(t, b, proof):
             worth = rate.min(axis=1, initial=np.inf)
         steep = 1 / np.maximum(b.drain(power, volt[0], ohms[0].max(), 0.0)[1], 1e-8)
         grown = 4 + steep
-        if line:
+        if line and tilt != 0:  # else no tangent is taken
             grown = grown + (volt[-1] / volt[0] - 1) * 2 * np.minimum(steep, 1e3) ** 3
         magnitude += after * np.max(2 * np.abs(power) * grown, initial=0.0)
         magnitude += abs(tilt) * b.high + before[k] * np.abs(taken).max()
@@ -302,12 +302,16 @@ def derived(proof, t):
 def check(path):
     """What was proven, as a sentence; ValueError with the reason where nothing was."""
     proof = json.loads(path.read_text())
+    with np.load(path.parent / Path(proof["table"]).name, allow_pickle=False) as file:
+        return judged(proof, {name: file[name] for name in sorted(file.files)})
+
+
+def judged(proof, t):
+    """The same of a proof and a table's arrays by name, in alphabetic order."""
     known = proof["scope"] == TABULATED or (
         proof["scope"] == CONTINUOUS and proof["kind"] == "prices"
     )
     require(proof["format"] == 2 and known, "format or scope unknown")
-    with np.load(path.parent / Path(proof["table"]).name, allow_pickle=False) as file:
-        t = {name: file[name] for name in sorted(file.files)}
     digest = hashlib.sha256()
     for name, array in t.items():
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode() + array.tobytes())

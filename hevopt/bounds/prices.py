@@ -152,8 +152,11 @@ def _greatest_switch_j(choices: Choices) -> Array:
 def step_maxima(choices: Choices, figure: Array) -> Array:
     """(time,) greatest of an (entry,) figure in each step, 0 where a step has no entry or less."""
     greatest = np.zeros(choices.steps)
-    np.maximum.at(greatest, choices.spread(np.arange(choices.steps)), figure)
-    return greatest
+    some = choices.first[:, -1] > choices.first[:, 0]
+    if some.any():
+        # Entries stand step by step.
+        greatest[some] = np.maximum.reduceat(figure, choices.first[some, 0])
+    return np.maximum(greatest, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -178,24 +181,30 @@ def dual(problem: Problem, choices: Choices, priced: Priced) -> list[Line]:
     Raises InfeasibleError where no path is open, or every path's priced part is above 0 by more than rounding:
     then g has no maximum, and no plan reaches the end charge.
     """
-    paths = _Paths(problem, choices, priced)
+    paths = _Paths.of(problem, choices, priced)
     lines = maximise(paths.line, typical_price_kgpj(choices, priced.worth), paths.steepest)
     return sorted(map(paths.lowered, lines), key=lambda line: line.value_kg)
 
 
 def dual_at(problem: Problem, choices: Choices, priced: Priced, scale: float) -> Line:
     """The supporting line of g at one scale S >= 0, its maximum or not; see `dual`."""
-    paths = _Paths(problem, choices, priced)
+    paths = _Paths.of(problem, choices, priced)
     return paths.lowered(paths.line(scale))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Paths:
-    """Choices under a price, and shortest paths over them."""
+    """Choices under a price, and shortest paths over them; fallen_kg: N of the rounding above."""
 
     problem: Problem
     choices: Choices
     priced: Priced
+    fallen_kg: float
+
+    @classmethod
+    def of(cls, problem: Problem, choices: Choices, priced: Priced) -> "_Paths":
+        fallen_kg = float(np.sum(step_maxima(choices, -choices.cost_kg)))
+        return cls(problem, choices, priced, fallen_kg)
 
     def line(self, scale: float) -> Line:
         """g's supporting line at a scale."""
@@ -208,9 +217,8 @@ class _Paths:
     def lowered(self, line: Line) -> Line:
         """A line less what rounding can have done to its value, with the shape of its prices."""
         priced, choices = self.priced, self.choices
-        fallen_kg = 2.0 * float(np.sum(step_maxima(choices, -choices.cost_kg)))
         own_kg = abs(line.value_kg - line.scale * priced.constant)
-        rounding_kg = EPSILON * (2 * choices.steps + 48) * (own_kg + fallen_kg)
+        rounding_kg = EPSILON * (2 * choices.steps + 48) * (own_kg + 2.0 * self.fallen_kg)
         rounding_kg += line.scale * priced.rounding_kg + TINY * (line.scale > 0)
         value_kg = line.value_kg - rounding_kg
         shape = np.append(priced.before[1:], priced.end_price)

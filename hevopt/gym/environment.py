@@ -13,6 +13,7 @@ worth on this drive as a whole, so the reward knows the drive; the observation d
 from collections.abc import Mapping
 from dataclasses import replace
 from math import isfinite
+from numbers import Integral, Real
 from typing import Any
 
 import gymnasium
@@ -80,8 +81,12 @@ class HybridEnv(gymnasium.Env):  # type: ignore[misc]
         DataError for options that are none, InfeasibleError where the first step has no usable control, or no plan
         reaches the charge asked at the end.
         """
-        super().reset(seed=seed)
+        if seed is not None and not (isinstance(seed, Integral) and seed >= 0):
+            raise DataError(f"reset: seed = {repr(seed)[:40]}; allowed: an integer, 0 or more")
+        super().reset(seed=None if seed is None else int(seed))
         options = {} if options is None else options
+        if not isinstance(options, Mapping):
+            raise DataError(f"reset: options = {repr(options)[:40]}; needed: a dict")
         if set(options) - set(_OPTIONS):
             raise DataError(f"reset: options {list(options)}; allowed: {', '.join(_OPTIONS)}")
         count = len(self._problems)
@@ -200,6 +205,12 @@ def _standing(now: Step) -> Step:
 def _check(problems: tuple[Problem, ...], price_kgpj: float | None, short: float) -> None:
     if not problems:
         raise DataError("HybridEnv: no problem; needed: one, or several of the same car")
+    for number, problem in enumerate(problems):
+        if not isinstance(problem, Problem):
+            raise DataError(
+                f"HybridEnv: problem {number} is a {type(problem).__name__}; needed: a Problem, as of "
+                "build_problem, several as HybridEnv(one, another)"
+            )
     first = problems[0].table
     for number, problem in enumerate(problems):
         table = problem.table
@@ -207,9 +218,13 @@ def _check(problems: tuple[Problem, ...], price_kgpj: float | None, short: float
             raise DataError(
                 f"HybridEnv: problem {number} has other controls than problem 0; needed: problems of the same car"
             )
-    if price_kgpj is not None and not (isfinite(price_kgpj) and price_kgpj >= 0):
+    if price_kgpj is not None and not _at_least(price_kgpj, 0.0):
         raise DataError(
-            f"HybridEnv: price_kgpj = {price_kgpj}; allowed: 0 or more, in kg fuel per J"
+            f"HybridEnv: price_kgpj = {repr(price_kgpj)[:40]}; allowed: 0 or more, in kg fuel per J"
         )
-    if not (isfinite(short) and short >= 1):
-        raise DataError(f"HybridEnv: short = {short}; allowed: 1 or more")
+    if not _at_least(short, 1.0):
+        raise DataError(f"HybridEnv: short = {repr(short)[:40]}; allowed: 1 or more")
+
+
+def _at_least(value: Any, least: float) -> bool:
+    return isinstance(value, Real) and isfinite(value) and float(value) >= least

@@ -234,9 +234,11 @@ def _same_at_every_step(problem: Problem) -> list[Array]:
 
 
 def _check(problem: Problem, training: Sequence[Problem]) -> None:
-    if not training:
+    several = isinstance(training, Sequence) and all(isinstance(p, Problem) for p in training)
+    if not several or not training:
+        found = f"training = {repr(training)[:40]}" if training else "no training"
         raise DataError(
-            "sdp: no training; pass problems of the same car on other cycles than the one driven"
+            f"sdp: {found}; pass a list of problems of the same car on other cycles than the one driven"
         )
     step_s, switching = problem.table.step_s[0], _same_at_every_step(problem)
     for n, other in enumerate(training):

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -24,11 +25,13 @@ from hevopt import (
     Problem,
     build_problem,
     certify,
+    compare,
     load_architecture,
     load_cycle,
     simulate,
     solve,
 )
+from hevopt.bounds import certificate
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
@@ -188,6 +191,27 @@ def process_s(words: list[str], cache: str, runs: int) -> float:
     return sorted(times)[runs // 2]
 
 
+def continuous_lines(turns: int = 5) -> list[str]:
+    """What certificates of all splits cost a comparison: processor time, by turns, least of all."""
+    cars = ("A", "B", *HYBRIDS)
+
+    def spent_s() -> float:
+        began = time.process_time()
+        compare("nedc", cars, observe=lambda *_: None)  # by one process
+        return time.process_time() - began
+
+    spent_s()
+    with_s, without_s = [], []
+    for _ in range(turns):
+        with_s.append(spent_s())
+        with mock.patch.object(certificate, "split_of", lambda _: None):
+            without_s.append(spent_s())
+    ratio = min(with_s) / min(without_s)
+    return [
+        f"| comparison of A to E, certificates of every split over those of the levels | {ratio:.2f} |"
+    ]
+
+
 def process_lines() -> list[str]:
     """hevopt as a user starts it."""
     with tempfile.TemporaryDirectory() as cache:
@@ -259,6 +283,7 @@ def main() -> None:
         *kernel_lines(problems["C2"]),
         f"| arrays alone, 1400 steps x 105 controls, 3001 nodes, plan and certificate | {foreign_s:.2f} s, "
         f"gap {solve_foreign():.3f} % |",
+        *continuous_lines(),
         *process_lines(),
         "",
         "NEDC, 41 torque levels, ms:",

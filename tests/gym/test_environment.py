@@ -171,7 +171,19 @@ def test_problems_of_other_cars_and_senseless_values_are_refused(problem):
         (lambda: HybridEnv(), "no problem"),
         (lambda: HybridEnv(problem, random_problem(0)), "problem 1 has other controls"),
         (lambda: HybridEnv(problem, short=0.5), "allowed: 1 or more"),
+        (lambda: HybridEnv(problem, short="much"), "short = 'much'; allowed: 1 or more"),
+        (lambda: HybridEnv(problem, short=None), "allowed: 1 or more"),
         (lambda: HybridEnv(problem, price_kgpj=float("nan")), "allowed: 0 or more"),
+        (lambda: HybridEnv(problem, price_kgpj="dear"), "price_kgpj = 'dear'; allowed: 0 or more"),
+        (lambda: HybridEnv("C2"), "problem 0 is a str; needed: a Problem"),
+        (lambda: HybridEnv([problem]), "problem 0 is a list"),
+        (lambda: HybridEnv(problem, None), "problem 1 is a NoneType"),
+        (lambda: HybridEnv(problem).reset(seed="one"), "seed = 'one'"),
+        (lambda: HybridEnv(problem).reset(seed=-1), "0 or more"),
+        (
+            lambda: HybridEnv(problem).reset(options="problem"),
+            "options = 'problem'; needed: a dict",
+        ),
     ):
         with pytest.raises(DataError, match=words):
             make()
