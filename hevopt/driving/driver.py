@@ -74,6 +74,53 @@ def gap_shares(demand: Demand, vehicle: Vehicle, engine: Engine, gearbox: Gearbo
     return np.where(changed, np.clip(share, 0.0, np.maximum(spare, 0.0)), 0.0)
 
 
+def launches_at_idle(
+    demand: Demand, engine: Engine, slow: Gearbox, fast: Gearbox
+) -> NDArray[np.bool_]:
+    """(time,) whether first gear's clutch passes the demand at idle speed with every final drive between two.
+
+    slow, fast: the gearbox with the lowest and the highest final drive
+    """
+    need = _most_need_nm(demand, engine, slow, fast)
+    launching = (demand.gear == 1) & (demand.wheel_torque_nm > 0)
+    idle_nm = float(engine.full_load_nm(np.array(engine.idle_radps)))
+    return ~launching | (_NEED_MARGIN * need <= idle_nm)
+
+
+def least_gap_shares(
+    demand: Demand, vehicle: Vehicle, engine: Engine, slow: Gearbox, fast: Gearbox
+) -> Array:
+    """(time,) no more than `gap_shares` with any final drive between two; 0 where that is not known.
+
+    slow, fast: the gearbox with the lowest and the highest final drive
+    """
+    gap = np.minimum(*(gap_shares(demand, vehicle, engine, box) for box in (slow, fast)))
+    low, high = (
+        np.maximum(box.ratios[demand.gear] * demand.wheel_speed_radps, engine.idle_radps)
+        for box in (slow, fast)
+    )
+    need = _most_need_nm(demand, engine, slow, fast)
+    need = need + _load_w(demand, vehicle) / _ALTERNATOR_EFFICIENCY_MIN / low
+    most = np.minimum(engine.covered_nm(low), engine.covered_nm(high))
+    for speed in engine.full_load_speed_radps:
+        inside = (low < speed) & (speed < high)
+        most = np.where(inside, np.minimum(most, engine.covered_nm(speed)), most)
+    spare = 1 - _NEED_MARGIN * need / np.maximum(np.nan_to_num(most), _LEAST_NM)
+    share = np.minimum(slow.shift_gap_s / demand.step_s, _GAP_SHARE_MAX)
+    return np.where(spare >= share, gap, 0.0)
+
+
+def _most_need_nm(demand: Demand, engine: Engine, slow: Gearbox, fast: Gearbox) -> Array:
+    """(time,) no less than the engine must give alone with any final drive between two, 0 or more."""
+    gear = demand.gear
+    drive = slow.needed_nm(
+        gear, slow.ratios[gear] * demand.wheel_speed_radps, demand.wheel_torque_nm
+    )
+    inertia = engine.inertia_kgm2 * fast.ratios[gear] * demand.wheel_accel_radps2
+    need: Array = np.where(gear > 0, np.maximum(drive, 0.0) + np.maximum(inertia, 0.0), 0.0)
+    return need
+
+
 def _load_w(demand: Demand, vehicle: Vehicle) -> Array | float:
     return vehicle.auxiliary_power_w if demand.auxiliary_w is None else demand.auxiliary_w
 

@@ -10,7 +10,9 @@ from rich.text import Text
 from hevopt.files.shown import printable, shown
 from hevopt.output.tables import titled_table
 from hevopt.sizing.candidates import Candidate
-from hevopt.sizing.size import Sizing
+from hevopt.sizing.found import Sizing
+from hevopt.sizing.proof.prove import RangeProof
+from hevopt.sizing.statements import statements
 
 _FRONT_MAX = 30
 
@@ -26,56 +28,8 @@ def tables(found: Sizing) -> Iterator[Table]:
 
 
 def notes(found: Sizing) -> str:
-    """How the designs ended, and what is proven of them."""
-    counts = ", ".join(f"{count} {fate}" for fate, count in found.counts.items() if count)
-    lines = [f"{len(found.found)} designs: {counts}"]
-    objective, best = found.study.objectives[0], found.best
-    if best is not None and best.values is not None and found.least is not None:
-        gap = best.values[0] / found.least - 1
-        of = "no design of this lattice" if found.lattice else "no design that was tried"
-        lines.append(
-            f"{of} is below {found.least:.5g} ({objective.name}), certified; the best is {100 * gap:.3f} % above"
-        )
-    lines += _proof_lines(found)
-    lines.append(f"results in {found.store}")
-    return "\n".join(lines)
-
-
-def _proof_lines(found: Sizing) -> list[str]:
-    """What is proven of the sizes between those tried."""
-    best, least = found.best, found.proven
-    if best is None or best.values is None or least is None:
-        return [] if found.lattice else [f"sizes between those tried: {found.unproven}"]
-    ranges = found.proofs[0].ranges
-    held = [
-        f"{printable(key)} = {shown(value)}"
-        for key, value in best.design.values.items()
-        if key not in ranges
-    ]
-    listed = ", ".join(
-        f"{printable(key)} {low:g} to {high:g}" for key, (low, high) in ranges.items()
-    )
-    lines = [
-        f"no car of {listed}{' with ' + ', '.join(held) if held else ''}{_within(found)} is below {least:.5g} "
-        f"({found.study.objectives[0].name}), whatever its strategy and requirements{_apart(found)}; the best is "
-        f"{100 * (best.values[0] / least - 1):.2f} % above"
-    ]
-    for proof in found.proofs:
-        lines.append(
-            f"  {printable(proof.cycle)}: without requirements {proof.best_l_per_100km:.4f} is reached, "
-            f"{100 * proof.gap:.2f} % above the bound, {proof.boxes} boxes in {proof.seconds:.1f} s"
-        )
-    return lines
-
-
-def _within(found: Sizing) -> str:
-    within = found.proofs[0].within
-    return f" that meets {' and '.join(map(printable, within))}" if within else ""
-
-
-def _apart(found: Sizing) -> str:
-    apart = found.proofs[0].apart
-    return f", and whether it meets {' and '.join(map(printable, apart))} or not" if apart else ""
+    """How the designs ended, what is proven of them, and where the results are."""
+    return "\n".join([*statements(found), f"results in {found.store}"])
 
 
 def as_dict(found: Sizing) -> dict[str, Any]:
@@ -89,8 +43,37 @@ def as_dict(found: Sizing) -> dict[str, Any]:
         "least_bound": found.least,
         "proven_over_ranges": found.proven,
         "not_proven": found.unproven,
+        "lattice_around_the_best": _around_dict(found),
+        "proofs": [_proof_dict(proof) for proof in found.proofs],
         "best": None if best is None else _as_dict(found, best),
         "front": [_as_dict(found, one) for one in found.front],
+    }
+
+
+def _around_dict(found: Sizing) -> dict[str, Any] | None:
+    around = found.around
+    if around is None:
+        return None
+    return {
+        "values": {key: list(values) for key, values in around.values.items()},
+        "held": dict(around.held),
+        "designs": around.designs,
+        "least_bound": around.least,
+    }
+
+
+def _proof_dict(proof: RangeProof) -> dict[str, Any]:
+    return {
+        "cycle": printable(proof.cycle),
+        "ranges": {key: list(ends) for key, ends in proof.ranges.items()},
+        "bound_l_per_100km": proof.bound_l_per_100km,
+        "best": dict(proof.best),
+        "best_l_per_100km": proof.best_l_per_100km,
+        "gap": proof.gap,
+        "closed": proof.closed,
+        "boxes": proof.boxes,
+        "constraints_held": list(proof.within),
+        "constraints_left_out": list(proof.apart),
     }
 
 

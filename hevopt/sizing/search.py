@@ -140,9 +140,13 @@ def _values(study: SizeStudy, params: dict[str, Any]) -> dict[str, Scalar]:
         levels = levels_of(values)
         if levels is not None:
             found[key] = levels[params[key]]
-        elif isinstance(params[key], float) and isinstance(values, Range):
-            rounded = float(f"{params[key]:.{_DIGITS}g}")
-            found[key] = min(max(rounded, float(values.low)), float(values.high))
-        else:
-            found[key] = params[key]
+        elif isinstance(values, Range):
+            found[key] = rounded(values, params[key])
     return found
+
+
+def rounded(values: Range, number: float) -> int | float:
+    """A number of a range in as many digits as designs have, within its ends."""
+    if values.whole:
+        return int(min(max(number, values.low), values.high))
+    return min(max(float(f"{number:.{_DIGITS}g}"), float(values.low)), float(values.high))

@@ -1,22 +1,23 @@
 """A whole sizing: from its file to the best design, every result in a store from which it goes on."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from math import fsum
 from pathlib import Path
 
 from hevopt.car_files.load import load_architecture
-from hevopt.display.facts import Shown
 from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.files.shown import printable, shown
-from hevopt.sizing.candidates import Candidate, Candidates, Fate
+from hevopt.sizing.around import around
+from hevopt.sizing.candidates import Candidate, Candidates
+from hevopt.sizing.found import Sizing
 from hevopt.sizing.proof.modes import NotProvable
 from hevopt.sizing.proof.prove import RangeProof, prove
-from hevopt.sizing.proof.space import SIZES
+from hevopt.sizing.proof.space import DRIVE, SIZES
 from hevopt.sizing.search import check_search, is_lattice, search
+from hevopt.sizing.statements import statements
 from hevopt.sizing.study_file import SizeStudy, read_size_study
 from hevopt.studies.provenance import files_digests
 from hevopt.sweeps.into_store import check_sweep
@@ -24,74 +25,8 @@ from hevopt.sweeps.plan.jobs import Job
 from hevopt.sweeps.plan.parameters import Range
 from hevopt.sweeps.run import Advance, CasesRun, Execution, Onlookers, meta_of
 from hevopt.sweeps.store.lock import locked
-from hevopt.sweeps.store.store import Store, open_store
+from hevopt.sweeps.store.store import PROVEN, Store, open_store
 from hevopt.sweeps.workers.backends import workers
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Sizing(Shown):
-    """What a sizing found.
-
-    lattice: whether every design there is was judged; found: all, in order
-    proofs: by cycle, what no car of the ranges is below; unproven: why there are none
-    """
-
-    study: SizeStudy
-    store: Path
-    lattice: bool
-    found: Sequence[Candidate]
-    proofs: tuple[RangeProof, ...] = ()
-    unproven: str = ""
-
-    def _facts(self) -> dict[str, object]:
-        best = self.best
-        return {"store": self.store, **self.counts, "best": best and dict(best.design.values)}
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Fate -> how many designs had it."""
-        fates = [one.fate for one in self.found]
-        return {str(fate): fates.count(fate) for fate in Fate}
-
-    @property
-    def solved(self) -> list[Candidate]:
-        """Designs that meet all requirements and were solved."""
-        return [one for one in self.found if one.fate is Fate.SOLVED]
-
-    @property
-    def front(self) -> list[Candidate]:
-        """Designs that no other one is as good as in every objective, the first objective's least first."""
-        ordered = sorted(self.solved, key=lambda one: (one.values or (), one.design.number))
-        kept: list[Candidate] = []
-        for one in ordered:
-            values = one.values or ()
-            if not any(
-                all(a <= b for a, b in zip(k.values or (), values, strict=True)) for k in kept
-            ):
-                kept.append(one)
-        return kept
-
-    @property
-    def best(self) -> Candidate | None:
-        """The design of the least first objective; None where none meets what is asked."""
-        return next(iter(self.front), None)
-
-    @property
-    def least(self) -> float | None:
-        """What no design judged can be below in the first objective: the least bound. None where one has none."""
-        judged = [one for one in self.found if one.fate in (Fate.SOLVED, Fate.DISCARDED)]
-        bounds = [one.bounds[0] for one in judged if one.bounds is not None]
-        return min(bounds) if bounds and len(bounds) == len(judged) else None
-
-    @property
-    def proven(self) -> float | None:
-        """What no car of the ranges is below in the first objective, requirements apart; None without a proof."""
-        car = None if self.best is None else self.best.car
-        if not self.proofs or car is None:
-            return None
-        litres = [proof.bound_l_per_100km for proof in self.proofs]
-        mean = fsum(w * f for w, f in zip(self.study.weights, litres, strict=True))
-        return self.study.objectives[0].value(car, mean)
 
 
 def size(
@@ -141,13 +76,27 @@ def sized(study: Path, place: Path, execution: Execution, command: str, watch: O
             watch.progress(advance)
 
         search(read, candidates, done)
-        found = Sizing(read, place, is_lattice(read), tuple(candidates.found))
+        found = proven_of(read, place, candidates, done)
+        opened.note(PROVEN, "\n".join(statements(found)))
+    return found
+
+
+def proven_of(
+    study: SizeStudy, place: Path, candidates: Candidates, done: Callable[[int], None]
+) -> Sizing:
+    """What was found with what is proven of it: over ranges, else by the lattice around the best design."""
+    found = Sizing(study, place, is_lattice(study), tuple(candidates.found))
     if found.best is None:
         raise InfeasibleError(_none_message(found))
     try:
         return replace(found, proofs=_proofs(found, found.best))
     except DataError as error:
-        return replace(found, unproven=str(error))
+        found = replace(found, unproven=str(error))
+    if found.lattice:
+        return found
+    lattice = around(study, candidates)
+    done(len(candidates.found))
+    return replace(found, found=tuple(candidates.found), around=lattice)
 
 
 def _proofs(found: Sizing, best: Candidate) -> tuple[RangeProof, ...]:
@@ -163,10 +112,12 @@ def _proofs(found: Sizing, best: Candidate) -> tuple[RangeProof, ...]:
     ranges = {
         key: (float(values.low), float(values.high))
         for key, values in sweep.parameters.items()
-        if key in SIZES and isinstance(values, Range)
+        if (key in SIZES or key == DRIVE) and isinstance(values, Range)
     }
     if not ranges:
-        raise NotProvable("no proof over ranges: no size of engine, machine or battery has a range")
+        raise NotProvable(
+            "no proof over ranges: no size of engine, machine or battery has a range, nor the final drive"
+        )
     fixed = {key: value for key, value in best.design.changes.items() if key not in ranges}
     texts = [constraint.text for constraint in sweep.constraints]
     return tuple(

@@ -11,10 +11,11 @@ from hevopt.errors import DataError
 from hevopt.output.sizing_tables import notes
 from hevopt.powertrain.powertrain import build_problem
 from hevopt.sizing.candidates import Candidate, Fate
+from hevopt.sizing.found import Sizing
 from hevopt.sizing.proof.limits import meets, vertices
 from hevopt.sizing.proof.prove import prove
 from hevopt.sizing.proof.space import Space
-from hevopt.sizing.size import Sizing, _proofs
+from hevopt.sizing.size import _proofs
 from hevopt.sizing.study_file import read_size_study
 from hevopt.studies.case import dp_case
 from hevopt.sweeps.plan.constraints import parse

@@ -6,52 +6,21 @@ from itertools import pairwise, product
 
 import pytest
 from command_line import call
+from sizing_helpers import CYCLE, HEAD
 
 from hevopt import load_architecture
 from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError
 from hevopt.forward.performance import performance
 from hevopt.powertrain.powertrain import build_problem
-from hevopt.sizing.candidates import Candidates, Fate
+from hevopt.sizing.candidates import Fate
 from hevopt.sizing.requirements import RequirementFile, reached
-from hevopt.sizing.search import is_lattice, search
-from hevopt.sizing.size import Sizing
 from hevopt.sizing.study_file import read_size_study
 from hevopt.studies.case import dp_case
-from hevopt.sweeps.run import picked
-from hevopt.sweeps.store.store import open_store
-from hevopt.sweeps.workers.work import run_job
 
-CYCLE = "time_s,speed_kmh\n" + "".join(
-    f"{s},{max(0, min(4 * s - 20, 50, 260 - 4 * s))}\n" for s in range(71)
-)
-HEAD = 'architecture = "C2"\ncycles = ["short.csv"]\n'
 FAST = '[[require]]\nfigure = "time_to_speed_s"\nspeed_kmh = 100\nboost = true\nat_most = {}\n'
 SIZES = {"engine.scale.displacement": (1.0,), "machine.scale.power": (0.7, 1.5)}
 LATTICE = "[parameters]\nengine.scale.displacement = [0.8, 1.0]\nmachine.scale.power = [0.7, 1.5]\n"
-
-
-@pytest.fixture
-def sized(tmp_path):
-    """The text of a study -> what its sizing finds, run in this process."""
-    (tmp_path / "short.csv").write_text(CYCLE)
-
-    def size(text: str, name: str = "s") -> Sizing:
-        path = tmp_path / f"{name}.toml"
-        path.write_text(HEAD + text)
-        study = read_size_study(path)
-        with open_store(tmp_path / f"{name}.sqlite") as store:
-
-            def run(jobs, keys):
-                for job in picked(jobs, set(keys) - set(store.endings())):
-                    store.add(run_job(job))
-                store.commit()
-
-            candidates = Candidates(study, store, {}, run)
-            search(study, candidates, lambda count: None)
-            return Sizing(study, store.path, is_lattice(study), tuple(candidates.found))
-
-    return size
 
 
 def by_hand(tmp_path) -> dict[tuple[float, float], tuple[float, float]]:
@@ -179,6 +148,10 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_store(tmp_path, mon
         "no design of this lattice is below",
     ):
         assert words in seen.out
+    page = tmp_path / "page.html"
+    assert call(monkeypatch, capsys, "report", tmp_path / "s.sqlite", "--out", page).status == 0
+    section = page.read_text().partition("Proven of the sizes")[2].partition("</ul>")[0]
+    assert "no design of this lattice is below" in section and "l/100 km" in section
     again = call(monkeypatch, capsys, "size", path, "--json")
     found = json.loads(again.out)
     assert found["lattice"] and found["designs"]["tried"] == 2

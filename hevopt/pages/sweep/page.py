@@ -31,10 +31,11 @@ from hevopt.pages.sweep.verdict import Group, groups_of, shown_value, verdict
 from hevopt.studies.provenance import code_digest, versions
 from hevopt.sweeps.plan.jobs import NOX_WEIGHT, Ending, Failure
 from hevopt.sweeps.store.reading import Record
+from hevopt.sweeps.store.store import PROVEN
 
 PRUNED_LISTED = 100
 # Entries of the store's meta that have a place of their own on the page.
-_SHOWN_APART = ("study", "command", "versions", "inputs")
+_SHOWN_APART = ("study", "command", "versions", "inputs", PROVEN)
 
 
 def sweep_page(sweep: Sweep) -> str:
@@ -55,6 +56,7 @@ def sweep_page(sweep: Sweep) -> str:
         weighted=bool(figures.weight.any()),
         verdict=verdict(sweep, groups),
         alerts=alerts(sweep, groups),
+        proven=sweep.meta.get(PROVEN, "").splitlines(),
         groups=groups,
         parameters=[
             (_broken(key), unit_of(key), is_numeric(values))

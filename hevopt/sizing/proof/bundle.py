@@ -24,7 +24,11 @@ _ROUNDING = 1e-6
 
 @dataclass(slots=True, eq=False, repr=False)
 class Planes(Shown):
-    """Entries (3, time, 4) under prices; switch: (time, mode, mode, 4) what switching costs, end: (4,)."""
+    """Planes under prices.
+
+    entries: (entry, time, 4), the last with the engine at rest; switch: (time, mode, mode, 4) what switching costs
+    end: (4,) the ends of the stored energy
+    """
 
     entries: Array
     switch: Array
@@ -103,8 +107,8 @@ def _paths(
     end = sum((w * planes.end for w, planes in used), np.zeros(4))
     value = np.where(barred[:, :, None], np.inf, entries @ corners.T)
     taken = switch @ corners.T
-    on = np.argmin(value[:2], axis=0)
-    least = np.array([np.min(value[:2], axis=0), value[2]])
+    on = np.argmin(value[:-1], axis=0)
+    least = np.array([np.min(value[:-1], axis=0), value[-1]])
     steps, count = least.shape[1], len(corners)
     to_go = np.zeros((2, count))
     follow = np.zeros((steps, 2, count), dtype=np.int64)
@@ -116,14 +120,14 @@ def _paths(
     mode, each = np.zeros(count, dtype=np.int64), np.arange(count)
     for k in range(steps):
         mode = follow[k, mode, each]
-        path[:, k] = np.where(mode == 1, 2, on[k])
+        path[:, k] = np.where(mode == 1, len(value) - 1, on[k])
     return to_go[0] + corners @ end, path
 
 
 def _cut(bundle: Sequence[Planes], path: Indices, corner: Array) -> Array:
     """(planes,) what the path costs at a corner by each of the bundle."""
     steps = np.arange(len(path))
-    mode = (path == 2).astype(np.int64)
+    mode = (path == len(bundle[0].entries) - 1).astype(np.int64)
     before = np.concatenate([[0], mode[:-1]])
     return np.array([
         (one.entries[path, steps].sum(axis=0) + one.switch[steps, before, mode].sum(axis=0) + one.end) @ corner

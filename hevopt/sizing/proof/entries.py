@@ -21,6 +21,7 @@ from math import pi
 import numpy as np
 
 from hevopt.bounds.step_prices import line_above
+from hevopt.car.architecture import Architecture
 from hevopt.car.engine_laws import CompactLaw
 from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Flags
@@ -66,20 +67,20 @@ def prices_of(after: Array) -> Prices:
     return Prices(after, before - after, before)
 
 
-def cell_of(laws: Laws, start_j: float, end_j: float) -> OneBattery:
+def cell_of(car: Architecture, start_j: float, end_j: float) -> OneBattery:
     """The battery of a car; NotProvable where U² is not linear in what it stores."""
-    battery = laws.car.battery
+    battery = car.battery
     line = line_above(battery.within_window())
     if line is None:
         raise NotProvable(
-            f"{laws.car.name}: no proof over ranges, its battery's curves are not those of one line"
+            f"{car.name}: no proof over ranges, its battery's curves are not those of one line"
         )
     low, high = (float(e) for e in line.energy_j[:2])
     squared = line.open_circuit_v**2
     slope = float(squared[1] - squared[0]) / (high - low)
     if slope <= 0 or line.discharge_ohm[0] <= 0 or line.charge_ohm[0] <= 0:
         raise NotProvable(
-            f"{laws.car.name}: no proof over ranges, its battery's voltage or loss is constant"
+            f"{car.name}: no proof over ranges, its battery's voltage or loss is constant"
         )
     peak = (1 - _ROOT_MIN**2) * float(squared[0]) / (4 * float(line.discharge_ohm[0]))
     return OneBattery(
@@ -116,14 +117,11 @@ class Fuel:
     def __init__(self, laws: Laws, mode: Mode) -> None:
         law = laws.car.engine.law
         assert isinstance(law, CompactLaw)  # as check_car has made sure
-        k, cm = law.fuel, law.stroke_m * np.minimum(mode.we, law.speed_max_radps) / pi
-        self._a2 = k.a2
-        self._slope = k.a + k.b * cm + k.c * cm**2
-        self._friction = k.l + k.l2 * cm**2
+        self._a2, self._slope, self._friction = law.fuel.a2, mode.slope, mode.friction
         self._bar = 4 * pi / law.displacement_m3 / _PA_PER_BAR
         self._rate = mode.we / law.heating_value_jpkg
         self.share = mode.share_e
-        self.idle = self._of(np.zeros_like(cm))[0]
+        self.idle = self._of(np.zeros_like(mode.we))[0]
 
     def _of(self, torque: Array) -> tuple[Array, Array]:
         load = np.maximum(self._bar * torque - self._friction, 0.0)
@@ -143,11 +141,15 @@ class Fuel:
 
 @dataclass(slots=True, eq=False, repr=False)
 class Box(Shown):
-    """A box of sizes within linear limits. low, high: (3,) factors; rows: (limit, 4), see `limits`"""
+    """A box of sizes within linear limits. low, high: (3,) factors; rows: (limit, 4), see `limits`
+
+    drive: lowest and highest final drive, None where it is the car's
+    """
 
     low: Array
     high: Array
     rows: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    drive: tuple[float, float] | None = None
 
     @property
     def corners(self) -> Array:
@@ -180,17 +182,18 @@ class Touch:
         self.weight = laws.step_s * prices.after
 
     def entries(self) -> Array:
-        """(3, time, 4): engine on; engine on and braking with an idle battery; engine at rest."""
+        """(entry, time, 4): engine on, by each of its modes; on and braking with an idle battery; at rest."""
         laws = self.laws
-        on, off = (self._mode(mode, laws.static[n]) for n, mode in enumerate(laws.modes))
-        braked = np.zeros_like(on)
-        mode = laws.modes[0]
-        idle = np.where(mode.idles, laws.step_s * Fuel(laws, mode).idle, 0.0)
+        on = [self._mode(mode) for mode in laws.on]
+        off = self._mode(laws.off)
+        braked = np.zeros_like(off)
+        idles = [np.where(mode.idles, Fuel(laws, mode).idle, 0.0) for mode in laws.on]
+        idle = laws.step_s * np.min(idles, axis=0)
         power, value, slope = stored(self.cell, np.zeros_like(idle), self.weight, self.prices.tilt)
         braked[:, ENGINE], braked[:, BATTERY] = idle, value - slope * power
-        return np.array([on, braked, off])
+        return np.array([*on, braked, off])
 
-    def _mode(self, mode: Mode, static: Array) -> Array:
+    def _mode(self, mode: Mode) -> Array:
         needed = needed_of(self.laws, mode, self.at)
         aside = _drop(needed, ENGINE, mode.inertia_e)
         needed = np.where(mode.joined[:, None], needed, aside)
@@ -198,7 +201,7 @@ class Touch:
         fuel = Fuel(self.laws, mode)
 
         def plane(u: Array) -> tuple[Array, Array]:
-            return self._plane(mode, fuel, static, needed, u)
+            return self._plane(mode, fuel, needed, u)
 
         a, b = low @ self.at, high @ self.at
         first, last = plane(a), plane(b)
@@ -224,18 +227,16 @@ class Touch:
         low = np.where(broken & mode.joined[:, None], least, low)
         return low, np.where(broken & ~mode.joined[:, None], low, high)
 
-    def _plane(
-        self, mode: Mode, fuel: Fuel, static: Array, needed: Array, u: Array
-    ) -> tuple[Array, Array]:
+    def _plane(self, mode: Mode, fuel: Fuel, needed: Array, u: Array) -> tuple[Array, Array]:
         """Slope by u, and the rest of the tangent, (time, 4)."""
         laws, (_, engine, machine, battery) = self.laws, self.at
         rest = np.zeros_like(needed)
-        c3 = np.where(mode.turns, laws.c3, 0.0) / mode.share
+        static, c3 = mode.static, mode.c3 / mode.share
         by_u = mode.w + 2 * c3 * u / machine
         own = static - c3 * (u / machine) ** 2
-        power = mode.w * u + static * machine + c3 * u**2 / machine + laws.auxiliary_w
+        power = mode.w * u + static * machine + c3 * u**2 / machine + mode.load
         touched, value, slope = stored(self.cell, power / battery, self.weight, self.prices.tilt)
-        rest[:, 0] += slope * laws.auxiliary_w
+        rest[:, 0] += slope * mode.load
         rest[:, MACHINE] += slope * own
         rest[:, BATTERY] += value - slope * touched
         rises = slope * by_u
@@ -270,11 +271,11 @@ def needed_of(laws: Laws, mode: Mode, at: Array) -> Array:
 
 
 def impossible(laws: Laws, box: Box) -> Flags:
-    """(3, time) where an entry is possible with no sizes of a box."""
-    found = []
+    """(entry, time) where an entry is possible with no sizes of a box."""
     corners = box.corners
-    for mode in laws.modes:
-        at = np.concatenate([[1.0], box.middle])
+    at = np.concatenate([[1.0], box.middle])
+
+    def barred(mode: Mode) -> Flags:
         needed = needed_of(laws, mode, at)
         needed = np.where(
             mode.joined[:, None],
@@ -282,10 +283,14 @@ def impossible(laws: Laws, box: Box) -> Flags:
             _drop(needed, ENGINE, mode.inertia_e),
         )
         short = (_drop(needed, MACHINE, mode.most) @ corners.T).min(axis=1) > 1e-6
-        found.append(~mode.possible | (mode.turns & short))
-    on, off = found
-    brakes = np.isfinite(laws.modes[0].low0[0])
-    return np.array([on, ~laws.modes[0].possible | ~brakes, off])
+        return ~mode.possible | (mode.turns & short)
+
+    brakes = np.isfinite(laws.off.low0[0])
+    runs = np.any([mode.possible for mode in laws.on], axis=0)
+    on = [barred(mode) for mode in laws.on]
+    for other in on[1:]:
+        other |= ~laws.apart
+    return np.array([*on, ~runs | ~brakes, barred(laws.off)])
 
 
 def _drop(line: Array, size: int, by: Array) -> Array:

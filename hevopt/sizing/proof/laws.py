@@ -3,7 +3,8 @@
 Sizes are theta = (engine, machine, battery), factors of the car as its file has it, and the mass that goes with
 them, m = m0 + mass . theta. At every step the driveline is in one of two modes, engine on or at rest; what it
 does in each is in modes.py. A gap in which gears change leaves a share of the step; where it depends on the
-sizes its least value in the box is taken, which burns and loses no more.
+sizes its least value in the box is taken, which burns and loses no more. Where the final drive has a range, see
+geared.py.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,37 +19,39 @@ from hevopt.car.machine_laws import LossByCoefficients
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
 from hevopt.driving.demand import Demand, demand_of
-from hevopt.powertrain.branches import Branch, branches
-from hevopt.powertrain.kinetic import Jumps
-from hevopt.powertrain.phases import driver_of
-from hevopt.problem.arrays import Array
+from hevopt.driving.driver import least_gap_shares
+from hevopt.powertrain.phases import Driver, driver_of
+from hevopt.problem.arrays import Array, Flags
+from hevopt.sizing.proof.geared import Pattern, between, check_launches, patterns_of, switching_of
 from hevopt.sizing.proof.modes import Mode, NotProvable, mode_of
 
 _FUNCTIONS = {"start_stop", "e_boost", "regenerative_braking", "nox_cut", "power_management"}
-_LEVELS = 3
-# Engine on, engine at rest.
-MODES = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Laws(Shown):
     """A car's laws over the sizes of a box.
 
-    modes: engine on, at rest; static: (mode, time) loss of the machine that no torque changes; c3: of its loss
-    switch_kg, switch_j: (size, time, mode, mode) [from, to], per engine and machine factor
+    on: modes of the engine turning, a second one where the driver's clutch is another with other final drives of a
+    range, at the steps `apart` (time,); off: with the engine at rest
+    switch_kg, switch_j: (size, time, mode, mode) [from, to], per engine and machine factor, engine on first
     mass0, mass: m = mass0 + mass . theta
     """
 
     car: Architecture
     step_s: Array
-    modes: tuple[Mode, Mode]
-    static: Array
-    c3: float
-    auxiliary_w: float
+    on: tuple[Mode, ...]
+    off: Mode
+    apart: Flags
     switch_kg: Array
     switch_j: Array
     mass0: float
     mass: Array
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """All modes, the engine turning first."""
+        return *self.on, self.off
 
 
 def check_car(car: Architecture) -> None:
@@ -77,40 +80,62 @@ def check_car(car: Architecture) -> None:
 
 def laws_of(
     cars: Mapping[tuple[int, ...], Architecture],
-    car: Architecture,
+    ends: Sequence[Architecture],
     cycle: Cycle,
     low: Array,
     high: Array,
 ) -> Laws:
     """The laws of a car for a box of factors.
 
-    cars: corner of the box, 0 or 1 for each size, -> its car
+    cars: corner of the box, 0 or 1 for each size, -> its car, whatever its final drive
+    ends: the car of factors 1, with the lowest and with the highest final drive where that has a range
     """
+    car = ends[0]
     check_car(car)
-    mass, mass0 = _masses(cars, car, low, high)
-    ends = [car.of_mass(float(mass0 + mass @ corner)) for corner in (low, high)]
-    heavy = {corner: demand_of(cycle, of.vehicle, of.gearbox) for corner, of in cars.items()}
     if cycle.gear is None:
         raise NotProvable(f"{cycle.name}: no proof over ranges on a cycle without listed gears")
+    mass, mass0 = _masses(cars, car, low, high)
+    heavy = {corner: demand_of(cycle, of.vehicle, of.gearbox) for corner, of in cars.items()}
+    for end in ends:
+        _check_driver({corner: _geared(of, end) for corner, of in cars.items()}, heavy)
+    gap = np.min([_least_gap(of, heavy[corner], ends) for corner, of in cars.items()], axis=0)
     demand = demand_of(cycle, car.vehicle, car.gearbox)
-    _check_driver(cars, heavy)
-    gaps = [driver_of(of, heavy[corner]).gap for corner, of in cars.items()]
-    gap = np.min(gaps, axis=0)
-    found = branches(car, demand, _LEVELS, None)
-    wheel = [demand_of(cycle, of.vehicle, of.gearbox).wheel_torque_nm for of in ends]
-    kgs = [of.vehicle.mass_kg for of in ends]
-    modes = [mode_of(car, demand, branch, gap, wheel, kgs) for branch in _sorted(found)]
-    loss = car.machines[0].loss
-    assert isinstance(loss, LossByCoefficients)  # as check_car has made sure
-    static = np.array([
-        np.where(mode.turns & (mode.w > 0), loss.c0 + loss.c1 * mode.w + loss.c2 * mode.w**2, 0.0)
-        for mode in modes
-    ])  # fmt: skip
-    kg, joule = _switching(car, _sorted(found))
+    drivers = [driver_of(end, demand) for end in ends]
+    if len(ends) > 1:
+        for corner, of in cars.items():
+            check_launches([_geared(of, end) for end in ends], heavy[corner])
+    masses = [car.of_mass(float(mass0 + mass @ corner)) for corner in (low, high)]
+    wheel = [demand_of(cycle, of.vehicle, of.gearbox).wheel_torque_nm for of in masses]
+    kgs = [of.vehicle.mass_kg for of in masses]
+
+    def mode(pattern: Pattern, *, on: bool) -> Mode:
+        found = [
+            mode_of(end, demand, pattern.settings(n, on=on), gap, wheel, kgs)
+            for n, end in enumerate(ends)
+        ]
+        return between(car, found[0], found[-1]) if len(found) > 1 else found[0]
+
+    patterns, apart = patterns_of(ends, drivers)
+    kg, joule = switching_of(car, patterns, apart)
     return Laws(
-        car, demand.step_s, (modes[0], modes[1]), static, loss.c3, car.vehicle.auxiliary_power_w,
-        kg, joule, mass0, mass,
+        car, demand.step_s, tuple(mode(pattern, on=True) for pattern in patterns), mode(patterns[0], on=False),
+        apart, kg, joule, mass0, mass,
     )  # fmt: skip
+
+
+def _geared(car: Architecture, end: Architecture) -> Architecture:
+    """A car with the gearbox of another."""
+    return replace(car, gearbox=end.gearbox, driveline=end.driveline)
+
+
+def _least_gap(car: Architecture, demand: Demand, ends: Sequence[Architecture]) -> Array:
+    if len(ends) == 1:
+        return driver_of(_geared(car, ends[0]), demand).gap
+    slow, fast = (end.gearbox for end in (ends[0], ends[-1]))
+    assert slow is not None and fast is not None  # as check_car has made sure
+    if car.shift_gap_s == 0:
+        return np.zeros(len(demand.gear))
+    return least_gap_shares(demand, car.vehicle, car.engine, slow, fast)
 
 
 def corners_of(sizes: int) -> list[tuple[int, ...]]:
@@ -144,7 +169,9 @@ def _check_driver(
     cars: Mapping[tuple[int, ...], Architecture], demands: Mapping[tuple[int, ...], Demand]
 ) -> None:
     """NotProvable where the driver does something else in one corner of the box than in another."""
-    drivers = {corner: driver_of(car, demands[corner]) for corner, car in cars.items()}
+    drivers: dict[tuple[int, ...], Driver] = {
+        corner: driver_of(car, demands[corner]) for corner, car in cars.items()
+    }
     first = next(iter(drivers.values()))
     for driver in drivers.values():
         changed = driver.launch_radps != first.launch_radps
@@ -157,36 +184,3 @@ def _check_driver(
                 f"no proof over ranges: at {first.demand.time_s[k]:g} s the driver's clutch is another with "
                 "other sizes of this box; narrow the ranges"
             )
-
-
-def _sorted(found: Sequence[Branch]) -> list[Branch]:
-    ordered = sorted(found, key=lambda branch: not branch.driven.state.engine_on)
-    if [branch.driven.state.engine_on for branch in ordered] != [True, False]:
-        raise NotProvable(
-            "no proof over ranges: engine on and engine at rest must be the only states"
-        )
-    return ordered
-
-
-def _switching(car: Architecture, found: Sequence[Branch]) -> tuple[Array, Array]:
-    """What switching takes per factor: of the engine what its inertia and starts take, of the machine its own."""
-    jumps, first = Jumps(car), found[0].driven.kinetic
-    steps = first.engine_j.shape[-1]
-    kg, joule = np.zeros((2, steps, MODES, MODES)), np.zeros((2, steps, MODES, MODES))
-    none = np.zeros_like(first.machines_j), np.zeros_like(first.engine_j)
-    for i, before in enumerate(found):
-        for j, after in enumerate(found):
-            runs = before.driven.state.engine_on and after.driven.state.engine_on
-            a, b = before.driven.kinetic, after.driven.kinetic
-            for size in range(2):
-                parts = [
-                    replace(one, machines_j=none[0])
-                    if size == 0
-                    else replace(one, engine_j=none[1])
-                    for one in (a, b, first)
-                ]
-                taken = jumps.taken(*parts, runs=runs)
-                kg[size, :, i, j], joule[size, :, i, j] = taken.fuel_kg, taken.energy_j
-            if after.driven.state.engine_on and not before.driven.state.engine_on:
-                kg[0, :, i, j] += car.engine.start_fuel_kg
-    return kg, joule

@@ -17,10 +17,11 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import ENGINE
+from hevopt.car.engine_laws import CompactLaw
+from hevopt.car.machine_laws import LossByCoefficients
 from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
 from hevopt.errors import DataError
-from hevopt.powertrain.branches import Branch
 from hevopt.powertrain.operation import Setting
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.units import STANDARD_GRAVITY_MPS2
@@ -43,6 +44,8 @@ class Mode(Shown):
     driving, braking: slopes of g; y0, y1: wheel torque over mass; low0, low1: (2, time) the same of the most that
     the machine may take of the braking, as two lines, the greater of which holds
     inertia, inertia_e: torques of the inertias of machine and engine; most, full, least: limits of the two
+    load: electric load; static, c3: loss of the machine that no torque changes, and per square of its torque
+    slope, friction: of the engine's fuel mean pressure, see entries.Fuel
     """
 
     possible: Flags
@@ -64,26 +67,34 @@ class Mode(Shown):
     most: Array
     full: Array
     least: Array
+    load: Array
+    static: Array
+    c3: Array
+    slope: Array
+    friction: Array
 
 
 def mode_of(
     car: Architecture,
     demand: Demand,
-    branch: Branch,
+    settings: Sequence[Setting],
     gap: Array,
     wheel: Sequence[Array],
     kgs: Sequence[float],
 ) -> Mode:
-    """A branch's mode. wheel: (time,) torque of the wheels at the masses kgs, least and most of the box."""
+    """A state's mode by its ways at their steps.
+
+    wheel: (time,) torque of the wheels at the masses kgs, least and most of the box
+    """
     steps = len(demand.step_s)
-    flags, arrays = np.zeros((4, steps), dtype=bool), np.zeros((13, steps))
+    flags, arrays = np.zeros((4, steps), dtype=bool), np.zeros((18, steps))
     mode = Mode(*flags, *arrays[:8], *np.full((2, 2, steps), -np.inf), *arrays[8:])
-    mode.share[:] = mode.share_e[:] = 1.0
+    mode.share[:] = mode.share_e[:] = mode.slope[:] = 1.0
     span = (kgs[1] - kgs[0]) or 1.0
     mode.y1 = (wheel[1] - wheel[0]) / span if kgs[1] > kgs[0] else np.zeros(steps)
     mode.y0 = wheel[0] - mode.y1 * kgs[0]
-    for piece in branch.driven.pieces:
-        _fill(car, demand, mode, piece.here, gap, wheel, kgs)
+    for here in settings:
+        _fill(car, demand, mode, here, gap, wheel, kgs)
     return mode
 
 
@@ -110,28 +121,48 @@ def _fill(
     lasting = gap[k] if any(use.gear is None for use in way.uses) else np.zeros(len(k))
     cut = here.interrupted
     possible = np.ones(len(k), dtype=bool)
+    mode.load[k] = here.shafts.load_w
     if turns:
-        machine = car.machines[0]
+        machine, loss = car.machines[0], car.machines[0].loss
+        assert isinstance(loss, LossByCoefficients)  # as check_car has made sure
         mode.w[k] = here.speed_radps("machine")
         mode.share[k] = 1 - lasting if "machine" in cut else 1.0
         mode.inertia[k] = machine.inertia_kgm2 * here.shafts.accel_radps2[way.active["machine"]]
         mode.most[k] = machine.limit_nm(np.abs(mode.w[k])) * mode.share[k]
+        mode.static[k] = np.where(
+            mode.w[k] > 0, loss.c0 + loss.c1 * mode.w[k] + loss.c2 * mode.w[k] ** 2, 0.0
+        )
+        mode.c3[k] = loss.c3
         possible &= mode.w[k] <= machine.speed_max_radps
     if runs:
-        engine = car.engine
-        mode.we[k] = here.engine_radps
-        mode.share_e[k] = 1 - lasting if ENGINE in cut else 1.0
-        mode.inertia_e[k] = engine.inertia_kgm2 * here.shafts.accel_radps2[way.active[ENGINE]]
-        mode.full[k] = engine.full_load_nm(mode.we[k]) * mode.share_e[k]
-        mode.least[k] = np.where(way.tied, engine.drag_nm(mode.we[k]), 0.0) * mode.share_e[k]
-        slow = way.tied & (mode.we[k] < engine.idle_radps * (1 - 1e-12))
-        possible &= ~slow & (mode.we[k] <= engine.speed_max_radps * (1 + 1e-12))
+        possible &= _fill_engine(car, mode, here, lasting)
     if not geared:
         possible &= (wheel[0][k] <= 0) | (wheel[1][k] <= 0) | (demand.wheel_speed_radps[k] == 0)
     mode.possible[k] = possible
     _brakes(
         car, demand, mode, k, lasting if cut.issuperset(way.active) else 0 * lasting, wheel, kgs
     )
+
+
+def _fill_engine(car: Architecture, mode: Mode, here: Setting, lasting: Array) -> Flags:
+    """The turning engine of one way at its steps; (state,) whether it is possible there."""
+    k, way, engine, law = here.shafts.step, here.way, car.engine, car.engine.law
+    assert isinstance(law, CompactLaw)  # as check_car has made sure
+    mode.we[k] = here.engine_radps
+    mode.slope[k], mode.friction[k] = pressures(law, mode.we[k])
+    mode.share_e[k] = 1 - lasting if ENGINE in here.interrupted else 1.0
+    mode.inertia_e[k] = engine.inertia_kgm2 * here.shafts.accel_radps2[way.active[ENGINE]]
+    mode.full[k] = engine.full_load_nm(mode.we[k]) * mode.share_e[k]
+    mode.least[k] = np.where(way.tied, engine.drag_nm(mode.we[k]), 0.0) * mode.share_e[k]
+    slow = way.tied & (mode.we[k] < engine.idle_radps * (1 - 1e-12))
+    fits: Flags = ~slow & (mode.we[k] <= engine.speed_max_radps * (1 + 1e-12))
+    return fits
+
+
+def pressures(law: CompactLaw, speed_radps: Array) -> tuple[Array, Array]:
+    """Slope e and friction l of p_me = e p_mf + a2 p_mf² + l at some speeds."""
+    k, cm = law.fuel, law.piston_speed_mps(speed_radps)
+    return k.a + k.b * cm + k.c * cm**2, k.l + k.l2 * cm**2
 
 
 def _brakes(

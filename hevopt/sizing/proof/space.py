@@ -21,6 +21,8 @@ SIZES: dict[str, tuple[int, bool]] = {
     "machine.scale.power": (1, False), "machine.scale.torque": (1, False),
     "battery.cells_in_series": (2, True), "battery.parallel": (2, True), "battery.scale.capacity": (2, False),
 }  # fmt: skip
+# The one ratio with a range: it is branched over.
+DRIVE = "gearbox.final_drive_ratio"
 
 
 class Space:
@@ -37,11 +39,15 @@ class Space:
         self.base = load_architecture(architecture, fixed)
         check_car(self.base)
         self.low, self.high, self._one = np.ones(3), np.ones(3), np.ones(3)
+        self.drive = self.ranges.get(DRIVE)
+        self._geared: dict[float, Architecture] = {}
         seen: dict[int, str] = {}
         for key, (low, high) in self.ranges.items():
+            if key == DRIVE and 0 < low < high:
+                continue
             if key not in SIZES:
                 raise NotProvable(
-                    f"{key}: no proof over its range; there is one for {', '.join(SIZES)}"
+                    f"{key}: no proof over its range; there is one for {', '.join([*SIZES, DRIVE])}"
                 )
             size, _ = SIZES[key]
             if size in seen:
@@ -58,10 +64,11 @@ class Space:
         held = {k: float(v) for k, v in self.fixed.items() if isinstance(v, int | float)}
         for text in constraints:
             lines, whole = half_spaces(text, held)
-            known = [line for line in lines if line.keys() - {""} <= self.ranges.keys()]
+            sizes = self.ranges.keys() - {DRIVE}
+            known = [line for line in lines if line.keys() - {""} <= sizes]
             (self.within if whole and known == lines else self.apart).append(text)
             rows += map(self._row, known)
-        self.root = Box(self.low, self.high, np.vstack(rows))
+        self.root = Box(self.low, self.high, np.vstack(rows), self.drive)
         if not len(self.root.corners):
             raise DataError(
                 "no car of the ranges meets the constraints; loosen one or widen a range"
@@ -78,7 +85,7 @@ class Space:
 
     def whole(self, theta: Array) -> Array | None:
         """The nearest factors with whole cells that meet the limits; None where neither number of cells does."""
-        for key in self.ranges:
+        for key in self.ranges.keys() - {DRIVE}:
             size, is_whole = SIZES[key]
             if is_whole:
                 value = theta[size] * self._one[size]
@@ -90,20 +97,36 @@ class Space:
                 return kept[0] if kept else None
         return theta if meets(self.root.rows, theta) else None
 
-    def values(self, theta: Array, *, whole: bool) -> dict[str, float]:
-        """Values of the parameters at some factors; whole: cells rounded, as a car has them."""
+    def values(self, theta: Array, drive: float | None = None) -> dict[str, float]:
+        """Values of the parameters at some factors and final drive, cells rounded, as a car has them."""
         found: dict[str, float] = {}
         for key in self.ranges:
+            if key == DRIVE:
+                found[key] = self.middle_drive(self.drive) if drive is None else drive
+                continue
             size, is_whole = SIZES[key]
             value = float(theta[size] * self._one[size])
-            found[key] = round(value) if is_whole and whole else value
+            found[key] = round(value) if is_whole else value
         return found
 
-    def car(self, theta: Array) -> Architecture:
-        """The car of some factors, whole cells."""
-        return load_architecture(
-            self.architecture, {**self.fixed, **self.values(theta, whole=True)}
-        )
+    @staticmethod
+    def middle_drive(drive: tuple[float, float] | None) -> float:
+        """The middle of a range of final drives; 0 where there is none."""
+        return 0.0 if drive is None else (drive[0] + drive[1]) / 2
+
+    def car(self, theta: Array, drive: float | None = None) -> Architecture:
+        """The car of some factors, whole cells, and a final drive, that of the middle by default."""
+        return load_architecture(self.architecture, {**self.fixed, **self.values(theta, drive)})
+
+    def ends(self, drive: tuple[float, float] | None) -> list[Architecture]:
+        """The car of factors 1, with the ends of a range of final drives where there is one."""
+        if drive is None:
+            return [self.base]
+        for ratio in drive:
+            if ratio not in self._geared:
+                changes = {**self.fixed, DRIVE: ratio}
+                self._geared[ratio] = load_architecture(self.architecture, changes)
+        return [self._geared[ratio] for ratio in drive]
 
     def corners(self) -> dict[tuple[int, ...], Architecture]:
         """Corner, 0 or 1 by size, -> its car."""

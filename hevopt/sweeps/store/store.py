@@ -34,6 +34,8 @@ from hevopt.sweeps.store.stored import damaged, loaded
 SCHEMA = 2
 # "hevs": tells a store from other programs' SQLite files.
 APPLICATION = 0x68657673
+# Entry of meta: what a sizing says of its designs, a line each.
+PROVEN = "proven"
 _COMMIT_S, _COMMIT_ROWS = 0.5, 200
 _TABLES = """
 CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT) WITHOUT ROWID;
@@ -84,6 +86,7 @@ class Store:
         with self._transaction() as run:
             for table in ("designs", "plan", "pruned"):
                 run.execute(f"DELETE FROM {table}")
+            run.execute("DELETE FROM meta WHERE name = ?", (PROVEN,))
             run.execute("INSERT OR IGNORE INTO meta VALUES ('created', ?)", (now,))
             run.executemany(
                 "INSERT OR REPLACE INTO meta VALUES (?, ?)",
@@ -95,6 +98,11 @@ class Store:
                 "INSERT INTO plan VALUES (?, ?, ?, ?, ?)",
                 (case._replace(cycle=encodable(case.cycle)) for case in plan),
             )
+
+    def note(self, name: str, value: str) -> None:
+        """Keep an entry of meta."""
+        with self._transaction() as run:
+            run.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (name, encodable(value)))
 
     def check_place(self) -> None:
         """StoreGone where the file at the store's path is no longer the one that was opened."""
