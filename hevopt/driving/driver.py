@@ -84,7 +84,8 @@ def launches_at_idle(
     need = _most_need_nm(demand, engine, slow, fast)
     launching = (demand.gear == 1) & (demand.wheel_torque_nm > 0)
     idle_nm = float(engine.full_load_nm(np.array(engine.idle_radps)))
-    return ~launching | (_NEED_MARGIN * need <= idle_nm)
+    holds: NDArray[np.bool_] = ~launching | (_NEED_MARGIN * need <= idle_nm)
+    return holds
 
 
 def least_gap_shares(

@@ -272,8 +272,7 @@ def needed_of(laws: Laws, mode: Mode, at: Array) -> Array:
 
 def impossible(laws: Laws, box: Box) -> Flags:
     """(entry, time) where an entry is possible with no sizes of a box."""
-    corners = box.corners
-    at = np.concatenate([[1.0], box.middle])
+    corners, at = box.corners, np.concatenate([[1.0], box.middle])
 
     def barred(mode: Mode) -> Flags:
         needed = needed_of(laws, mode, at)
@@ -283,7 +282,8 @@ def impossible(laws: Laws, box: Box) -> Flags:
             _drop(needed, ENGINE, mode.inertia_e),
         )
         short = (_drop(needed, MACHINE, mode.most) @ corners.T).min(axis=1) > 1e-6
-        return ~mode.possible | (mode.turns & short)
+        found: Flags = ~mode.possible | (mode.turns & short)
+        return found
 
     brakes = np.isfinite(laws.off.low0[0])
     runs = np.any([mode.possible for mode in laws.on], axis=0)
