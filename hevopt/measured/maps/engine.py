@@ -167,7 +167,13 @@ def _nox(request: Request, facts: EngineFacts, in_grid: bool, idle_radps: float)
         raise DataError(
             f"{source.path.name}: no column of NOx found; name it with --column nox=NAME"
         )
-    return None if points is None else in_lines(points, proportional=True, idle_radps=idle_radps)
+    if points is None:
+        return None
+    lines = in_lines(points, proportional=True, idle_radps=idle_radps)
+    if len(lines.speed_radps) < 2 or not np.ptp(points.torque_nm):
+        name = (source or request.source).path.name
+        raise DataError(f"{name}: NOx at one speed or one torque alone; several of both are needed")
+    return lines
 
 
 def _nox_notes(request: Request, nox: Lines, said: list[str]) -> list[str]:

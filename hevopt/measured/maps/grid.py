@@ -108,7 +108,8 @@ def torque_axis(low: float, high: float) -> Array:
 def on_axes(lines: Lines, speed_radps: Array, torque_nm: Array) -> MapGrid:
     """The points on the axes: interpolated as the grid that they are, on whatever axes, else on triangles."""
     own = np.unique(lines.points.torque_nm)
-    if lines.regular and len(own) > 1 and _share_torques(lines, own):
+    several = min(len(own), len(lines.speed_radps)) > 1
+    if lines.regular and several and _share_torques(lines, own):
         values = np.full((len(lines.speed_radps), len(own)), np.nan)
         values[lines.line, np.searchsorted(own, lines.points.torque_nm)] = lines.points.value
         grid = MapGrid(lines.speed_radps, own, values)

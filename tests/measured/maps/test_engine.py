@@ -140,6 +140,20 @@ def test_nox_of_a_table_of_its_own_is_reported_like_fuel(hevopt):
     assert covered == pytest.approx(100 * (1 - 20 / FULL.mean()), abs=2)
 
 
+@pytest.mark.parametrize("keep", ["one speed", "one torque"])
+def test_nox_of_one_line_of_points_is_named(hevopt, keep):
+    write("b.csv", "n [rpm],T [Nm],fuel [g/h]", *bench().T[:3])
+    rpm, torque, _, nox = bench().T
+    if keep == "one speed":
+        rpm = np.full(len(rpm), rpm[0])
+    else:
+        torque = np.full(len(torque), 50.0)
+    write("nox.csv", "n [rpm],T [Nm],NOx [g/h]", rpm, torque, nox)
+    seen = hevopt(*IMPORT, "--nox", "nox.csv")
+    assert seen.status == 2 and "Warning" not in seen.err, seen
+    assert "nox.csv: NOx at one speed or one torque alone" in seen.err, seen.err
+
+
 def test_points_of_the_dragged_engine_are_no_doubt_about_the_map(hevopt):
     rpm, torque, fuel, _ = bench().T
     columns = ([*rpm, *SPEEDS], [*torque, *DRAG], [*fuel, *np.zeros(len(SPEEDS))])
