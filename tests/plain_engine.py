@@ -1,6 +1,6 @@
 """The mean-value equations a second time, in plain scalar Python from the engine's file; no code of hevopt's.
 
-A state is a list of numbers in the order of NAMES.
+A state is a list of numbers in the order of NAMES; SECOND_PIPE behind them where the charge pipe has two halves.
 """
 
 import tomllib
@@ -14,6 +14,7 @@ P_AIR, T_AIR = 101_325.0, 298.15
 NAMES = (
     "m1 b1 U1 m2 b2 U2 m3 b3 U3 m4 b4 U4 m5 b5 U5 turbo wall vanes egr meter boost pedal engine road tyre"
 ).split()
+SECOND_PIPE = ["m6", "b6", "U6"]
 
 
 def cp_of(t, x):
@@ -68,6 +69,15 @@ class PlainCar:
         self.clutch = 1.5 * max(self.file["full_load"]["torque_nm"])
         self.rate = 0.0
         self.hold = None
+        # Pressure loss between two halves of the charge pipe; none: it is one volume.
+        self.join = None
+
+    def best(self, cm):
+        """Indicated efficiency with much air."""
+        c = self.mv["cylinders"]
+        return c["efficiency"] * (
+            1 - ((cm - c["efficiency_best_mps"]) / c["efficiency_width_mps"]) ** 2
+        )
 
     def full(self, w):
         curve = self.file["full_load"]
@@ -115,7 +125,7 @@ class PlainCar:
         cm = 2 * self.file["stroke_mm"] / 1e3 * rpm / 60
         fmep = 1e5 * (cyl["friction_bar"] + cyl["friction_bar_s2pm2"] * cm**2)
         pmep = 1e5 * (c["pumping_bar"] + c["pumping_bar_1000rpm"] * (rpm / 1000) ** 2)
-        eta = cyl["efficiency"] * (c["efficiency_fall"] - c["efficiency_fall_with_load"] * pedal)
+        eta = self.best(cm) * (c["efficiency_fall"] - c["efficiency_fall_with_load"] * pedal)
         asked = (4 * pi * pedal * self.full(w) / vd + fmep + pmep) * vd / eta / q_lhv
         air = into * (1 - three["x"]) * 4 * pi / w
         most = air / cyl["stoichiometric_air"] / table(rpm, c["smoke_rpm"], c["smoke_lambda"])
@@ -150,7 +160,7 @@ class PlainCar:
         return fuel * w / 4 / pi, vanes, egr, growth
 
     def rates(self, t, values):
-        y = dict(zip(NAMES, values, strict=True))
+        y = self.named(values)
         mv, cyl = self.mv, self.mv["cylinders"]
         litres = list(mv["volumes"].values())
         one, two, three, four, five = (
@@ -158,14 +168,12 @@ class PlainCar:
         )
         air = {"p": P_AIR, "t": T_AIR, "x": 0.0, "rho": P_AIR / R / T_AIR, "h": h_of(T_AIR, 0.0)}
         limit = mv["restrictions"]["linear_below_pa"]
+        halves = self.join is not None
+        late = gas(y["m6"], y["b6"], y["U6"], litres[1] / 1e3) if halves else two
 
-        def loss(a, b, key):
+        def loss(a, b, h):
             up, sign = (a, 1) if a["p"] >= b["p"] else (b, -1)
-            return (
-                sign
-                * sqrt(up["rho"] / mv["restrictions"][key])
-                * soft_root(abs(a["p"] - b["p"]), limit)
-            )
+            return sign * sqrt(up["rho"] / h) * soft_root(abs(a["p"] - b["p"]), limit)
 
         def of(w, a, b, what):
             return w * (a if w > 0 else b)[what]
@@ -179,9 +187,9 @@ class PlainCar:
         pedal = min(y["pedal"] + self.rate * t, 1.0)
         fuel, vanes, egr_open, growth = self.fuel_and_commands(w, pedal, into, y, three, four)
         w1, w3, w5 = (
-            loss(air, one, "filter_pm4"),
-            loss(two, three, "intercooler_pm4"),
-            loss(five, air, "exhaust_pm4"),
+            loss(air, one, mv["restrictions"]["filter_pm4"]),
+            loss(late, three, mv["restrictions"]["intercooler_pm4"]),
+            loss(five, air, mv["restrictions"]["exhaust_pm4"]),
         )
         wc, pc = self.compressor(turbo, one, two)
         wt, pt = self.turbine(turbo, y["vanes"], four, five)
@@ -197,13 +205,13 @@ class PlainCar:
         afs, q = cyl["stoichiometric_air"], self.file["fuel"]["heating_value_mjpkg"] * 1e6
         lam = into * (1 - three["x"]) / (afs * fuel)
         burn = min(lam, 1) * fuel * q
+        cm = 2 * self.file["stroke_mm"] / 1e3 * rpm / 60
         indicated = (
-            cyl["efficiency"]
+            self.best(cm)
             * (1 - cyl["rich_loss"] * exp(-(max(lam, 1) - 1) / cyl["rich_width"]))
             * burn
         )
         pumping = four["p"] - three["p"] + cyl["gas_exchange_bar"] * 1e5 * (rpm / 2000) ** 2
-        cm = 2 * self.file["stroke_mm"] / 1e3 * rpm / 60
         fmep = 1e5 * (cyl["friction_bar"] + cyl["friction_bar_s2pm2"] * cm**2)
         piston = indicated - pumping * vd * w / 4 / pi
         torque = (piston - fmep * vd * w / 4 / pi) / w
@@ -212,21 +220,27 @@ class PlainCar:
         made = min(fuel * (1 + afs), fuel + into * (1 - three["x"]))
 
         cool, ecool = mv["intercooler"], mv["recirculation"]
-        t_c = two["t"] - cool["effectiveness"] * (two["t"] - cool["coolant_k"])
+        t_c = late["t"] - cool["effectiveness"] * (late["t"] - cool["coolant_k"])
         t_e = four["t"] - ecool["effectiveness"] * (four["t"] - ecool["coolant_k"])
-        into3 = w3 * (h_of(t_c, two["x"]) if w3 > 0 else three["h"])
+        into3 = w3 * (h_of(t_c, late["x"]) if w3 > 0 else three["h"])
         egr3 = we * (h_of(t_e, four["x"]) if we > 0 else three["h"])
         q4 = mv["exhaust_wall"]["gas_wpk"] * (four["t"] - y["wall"])
-        d = dict.fromkeys(NAMES, 0.0)
-        d["m1"], d["m2"], d["m3"] = w1 - wc, wc - w3, w3 + we - into
+        d = dict.fromkeys(y, 0.0)
+        w2 = loss(two, late, self.join) if halves else w3
+        d["m1"], d["m2"], d["m3"] = w1 - wc, wc - w2, w3 + we - into
         d["m4"], d["m5"] = into + fuel - wt - we, wt - w5
         d["b1"] = of(w1, air, one, "x") - of(wc, one, two, "x")
-        d["b2"] = of(wc, one, two, "x") - of(w3, two, three, "x")
-        d["b3"] = of(w3, two, three, "x") + of(we, four, three, "x") - into * three["x"]
+        behind = late if halves else three
+        d["b2"] = of(wc, one, two, "x") - of(w2, two, behind, "x")
+        d["b3"] = of(w3, late, three, "x") + of(we, four, three, "x") - into * three["x"]
         d["b4"] = into * three["x"] + made - of(wt, four, five, "x") - of(we, four, three, "x")
         d["b5"] = of(wt, four, five, "x") - of(w5, five, air, "x")
         d["U1"] = of(w1, air, one, "h") - of(wc, one, two, "h")
-        d["U2"] = of(wc, one, two, "h") + pc - of(w3, two, three, "h")
+        d["U2"] = of(wc, one, two, "h") + pc - of(w2, two, behind, "h")
+        if halves:
+            d["m6"] = w2 - w3
+            d["b6"] = of(w2, two, late, "x") - of(w3, late, three, "x")
+            d["U6"] = of(w2, two, late, "h") - of(w3, late, three, "h")
         d["U3"] = into3 + egr3 - into * three["h"]
         d["U4"] = exhaust_h - of(wt, four, five, "h") - of(we, four, three, "h") - q4
         d["U5"] = of(wt, four, five, "h") - pt - of(w5, five, air, "h")
@@ -239,12 +253,16 @@ class PlainCar:
         d["boost"] = growth
         if self.hold is not None:
             d["pedal"] = (self.hold - torque) / self.full(w)
-            return [d[name] for name in NAMES]
+            return list(d.values())
         slip = tanh(w - self.k * y["road"]) * self.clutch
         d["engine"] = (torque - slip) / self.file["inertia_kgm2"]
         d["tyre"] = (slip * self.k * self.eta - y["tyre"]) / 0.05
         d["road"] = (y["tyre"] - self.road(y["road"])) / self.m
-        return [d[name] for name in NAMES]
+        return list(d.values())
+
+    def named(self, values):
+        """States by name."""
+        return dict(zip(NAMES if self.join is None else NAMES + SECOND_PIPE, values, strict=True))
 
     def tip_in(self, start, times, pedal_per_s):
         """One dict of states per time, from a state at time 0 with the pedal going down; LSODA at 1e-9."""
@@ -253,7 +271,11 @@ class PlainCar:
             self.rates, (0, times[-1]), start, "LSODA", times, rtol=1e-9, atol=1e-10, max_step=0.02
         )
         assert driven.success
-        return [dict(zip(NAMES, state, strict=True)) for state in driven.y.T]
+        return [self.named(state) for state in driven.y.T]
+
+    def boost(self, y):
+        """Pressure of the intake manifold in a state."""
+        return gas(y["m3"], y["b3"], y["U3"], self.mv["volumes"]["intake_manifold_l"] / 1e3)["p"]
 
     def accel(self, y):
         """Acceleration in a state."""

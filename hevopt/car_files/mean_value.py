@@ -114,6 +114,8 @@ class CylindersFile(FileModel):
     filling_speed_rpm: Annotated[float, Field(ge=100, le=20_000)]
     stoichiometric_air: Annotated[float, Field(ge=1, le=50)]
     efficiency: Annotated[float, Field(ge=0.05, le=0.7)]
+    efficiency_best_mps: Annotated[float, Field(ge=0, le=30)]
+    efficiency_width_mps: Annotated[float, Field(ge=5, le=1e6)]
     rich_loss: _Share
     rich_width: Annotated[float, Field(ge=0.01, le=10)]
     friction_bar: Annotated[float, Field(ge=0, le=20)]

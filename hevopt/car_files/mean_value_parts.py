@@ -78,6 +78,8 @@ def _engine(file: EngineFile, data: MeanValueFile) -> Engine:
             heating_value_jpkg=file.fuel.heating_value_mjpkg * TO_SI["_mjpkg"][1],
             stoichiometric_air=cylinders.stoichiometric_air,
             efficiency=cylinders.efficiency,
+            efficiency_best_mps=cylinders.efficiency_best_mps,
+            efficiency_width_mps=cylinders.efficiency_width_mps,
             rich_loss=cylinders.rich_loss,
             rich_width=cylinders.rich_width,
             friction_pa=cylinders.friction_bar * _BAR,

@@ -1,7 +1,7 @@
 """Compiled control unit: pedal to fuel, vanes and recirculation.
 
-    (26) q_demand = (4 pi T / V_d + fmep + pm0 + pm2 (n/1000)²) V_d / (eta_0 (e0 - e1 load) q),
-         T = pedal x full load(n)
+    (26) q_demand = (4 pi T / V_d + fmep + pm0 + pm2 (n/1000)²) V_d / (eta_0 e(c_m) (e0 - e1 load) q),
+         T = pedal x full load(n), efficiency over speed e(c_m) as in (15)
     (27) q <= m_air / (AF_s lambda_smoke(n)), m_air of a cycle from the flow into the cylinders (speed density)
          or from the air meter, which lags and knows neither what recirculates nor what the pipes take up
     (28) vanes = map(n, load) - kp e - ki int e,  e = p_target - p3, from a load on; opened above the limit of p4;
@@ -18,7 +18,7 @@ from math import inf, pi
 from typing import NamedTuple
 
 from hevopt._compile import compiled
-from hevopt.mean_value._cylinder_kernels import friction_pa
+from hevopt.mean_value._cylinder_kernels import friction_pa, work_per_fuel
 from hevopt.mean_value._gas_kernels import State, curve
 from hevopt.mean_value.parameters import (
     EGR,
@@ -72,8 +72,7 @@ def demanded_fuel(
     pressure = _FOUR_PI * torque / cylinders.displacement_m3 + pumping
     pressure += friction_pa(speed, cylinders)
     fall = control.efficiency_fall - control.efficiency_fall_with_load * pedal
-    share = cylinders.efficiency * fall * cylinders.heating_value_jpkg
-    return pressure * cylinders.displacement_m3 / share
+    return pressure * cylinders.displacement_m3 / (work_per_fuel(speed, cylinders) * fall)
 
 
 @compiled()

@@ -2,13 +2,15 @@
 
     (13) W = eta_v p3 V_d w / (4 pi R T3),  eta_v = eta_v0(n) (r_c - (p4/p3)^(1/1.35)) / (r_c - 1)
     (14) lambda = W (1 - x3) / (AF_s W_f)
-    (15) eta_i = eta_0 (1 - k exp(-(lambda - 1) / s)), and lambda times that below 1, where the rest stays unburnt
+    (15) eta_i = eta_0 e(c_m) (1 - k exp(-(lambda - 1) / s)), and lambda times that below 1, where the rest stays
+         unburnt;  e(c_m) = 1 - ((c_m - c_0) / c_1)²: slow, walls take heat; fast, combustion is late
     (16) pmep = p4 - p3 + c_v (n / 2000)²,  fmep = f0 + f2 c_m²  (mean piston speed c_m)
     (17) T = (eta_i W_f q - (pmep + fmep) V_d w / 4 pi) / w
     (18) Q_wall = (k0 + k1 1000 / n) q W_f
     (19) enthalpy of the exhaust = W h3 + q W_f + pumping work - indicated work - Q_wall
 
-(13), (16): Eriksson, Nielsen 2014; (15) to (18): fitted, see the engines' files. (19) closes the energy.
+(13), (16): Eriksson, Nielsen 2014; e(c_m): the published fuel law of the engines' files, whose indicated efficiency
+is a parabola of mean piston speed; (15) to (18) else: fitted, see there. (19) closes the energy.
 Burnt mass: W_f of fuel makes (1 + AF_s) W_f of products, as far as there is air.
 """
 
@@ -23,6 +25,8 @@ _FOUR_PI = 4.0 * pi
 _RESIDUAL_EXPONENT = 1.0 / 1.35
 _RADPS_1000RPM = 2000.0 * pi / 60.0
 _LAMBDA_MOST = 1e3
+# Share of the best efficiency below which it does not fall with speed, far beyond any engine's.
+_LEAST_SHARE = 0.1
 # Newton's steps to the fuel of a torque, and the share of its work that may be left.
 _FUEL_STEPS, _FUEL_SHARE = 12, 1e-13
 
@@ -50,6 +54,15 @@ def filling(speed: float, inlet: State, outlet: State, cylinders: Cylinders) -> 
     share = (r - pow(outlet.pressure / inlet.pressure, _RESIDUAL_EXPONENT)) / (r - 1.0)
     filled = max(most, 0.0) * max(share, 0.0)
     return filled * inlet.density * cylinders.displacement_m3 * speed / _FOUR_PI
+
+
+@compiled(inline="always")
+def work_per_fuel(speed: float, cylinders: Cylinders) -> float:
+    """Indicated work of a mass of fuel with much air at an engine speed, equation (15)."""
+    off = cylinders.stroke_m * speed / pi - cylinders.efficiency_best_mps
+    off /= cylinders.efficiency_width_mps
+    share = max(1.0 - off * off, _LEAST_SHARE)
+    return cylinders.efficiency * share * cylinders.heating_value_jpkg
 
 
 @compiled(inline="always")
@@ -81,7 +94,7 @@ def fuel_of(
     most = max(flow * (1.0 - inlet.burnt), 0.0) / cylinders.stoichiometric_air
     if work <= 0.0 or most <= 0.0:
         return 0.0
-    per_fuel = cylinders.efficiency * cylinders.heating_value_jpkg
+    per_fuel = work_per_fuel(speed, cylinders)
     fuel = min(work / per_fuel, most)
     for _ in range(_FUEL_STEPS):
         excess = most / fuel
@@ -105,7 +118,8 @@ def combustion(
     burning = min(excess, 1.0)
     lost = exp(-(max(excess, 1.0) - 1.0) / cylinders.rich_width)
     released = burning * fuel * cylinders.heating_value_jpkg
-    indicated = cylinders.efficiency * (1.0 - cylinders.rich_loss * lost) * released
+    working = work_per_fuel(speed, cylinders) * burning * fuel
+    indicated = working * (1.0 - cylinders.rich_loss * lost)
     # Per rad of crank: mean pressure times displacement over 4 pi is a torque.
     per_pa = cylinders.displacement_m3 / _FOUR_PI
     turns = speed / (2.0 * _RADPS_1000RPM)

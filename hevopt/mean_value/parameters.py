@@ -119,6 +119,8 @@ class Cylinders(NamedTuple):
     heating_value_jpkg: float
     stoichiometric_air: float
     efficiency: float
+    efficiency_best_mps: float
+    efficiency_width_mps: float
     rich_loss: float
     rich_width: float
     friction_pa: float

@@ -12,6 +12,7 @@ from plain_engine import PlainCar
 from hevopt import DataError, SolverError
 from hevopt.files.lookup import shipped_folder
 from hevopt.mean_value import states as s
+from hevopt.mean_value._cylinder_kernels import work_per_fuel
 from hevopt.mean_value._run_kernels import TABLEAUX, march, observe, rates
 from hevopt.mean_value.balances import balances
 from hevopt.mean_value.car import BENCH, cruise, model_of
@@ -289,17 +290,31 @@ def test_standstill_of_everything_stays_at_rest():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_settled_full_load_is_the_files_from_1000_to_4000_rpm_and_its_fuel_the_maps(name):
-    """Beyond 4000 rpm it is 3 to 12 % above, as efficiency does not fall with speed: the documentation says so."""
+def test_efficiency_over_speed_is_that_of_the_files_fuel_law(name):
+    law = shipped(name).car.contents["engine"]["fuel_coefficients"]
+    cylinders = shipped(name).diesel.engine.cylinders
+    speed = np.array([800, 1500, 2500, 4000, 5000]) * RPM
+    cm = cylinders.stroke_m * speed / pi
+    of_law = law["a"] + law["b"] * cm + law["c"] * cm**2
+    ours = np.array([work_per_fuel(x, cylinders) for x in speed]) / cylinders.heating_value_jpkg
+    assert ours / cylinders.efficiency == pytest.approx(
+        of_law / (law["a"] - law["b"] ** 2 / 4 / law["c"]), rel=1e-4
+    )
+    assert work_per_fuel(1e4, cylinders) > 0
+
+
+@pytest.mark.parametrize(("name", "top_rpm"), [("compact_1300", 5000), ("A", 4500)])
+def test_settled_full_load_is_the_files_from_1000_rpm_on_and_its_fuel_the_maps(name, top_rpm):
+    """The 1.6 l engine's last point, 100 Nm at 5000 rpm, is 8 % above: the documentation says why."""
     model, engine = bench(name), shipped(name).car.engine
-    for rpm in (1000, 1500, 2000, 3000, 4000):
+    for rpm in (1000, 1500, 2000, 3000, 4000, top_rpm):
         y = steady_state(model, rpm * RPM)
         at = told(model, y)
         assert at["torque_nm"] == pytest.approx(at["full_load_nm"], rel=0.04)
         map_kgps = engine.fuel_kgps(np.array([at["torque_nm"]]), np.array([rpm * RPM]))[0]
         assert at["fuel_kgps"] == pytest.approx(map_kgps, rel=0.06)
         assert 1.0 < at["p4_pa"] / at["p3_pa"] < 1.6
-        assert at["t4_k"] < 1050 and y[s.TURBO] / RPM < 230e3
+        assert at["t4_k"] < 1055 and y[s.TURBO] / RPM < 230e3
         assert at["flow_number"] > at["surge_number"]
 
 

@@ -134,7 +134,8 @@ def test_a_turbine_stalls_with_twice_its_best_torque_idles_at_twice_its_best_spe
 
 def test_filling_falls_with_back_pressure_and_is_a_share_of_what_is_swept():
     cylinders = Cylinders(
-        1248e-6, 0.082, 17.6, 0.9, 0.06, 2400 * pi / 30, 42.9e6, 14.5, 0.468, 0.15, 0.3, 1.2e5, 680, 1e4, 0.2, 0.1
+        1248e-6, 0.082, 17.6, 0.9, 0.06, 2400 * pi / 30, 42.9e6, 14.5, 0.476, 6.853, 14.85,
+        0.15, 0.3, 1.2e5, 680, 1e4, 0.2, 0.1
     )  # fmt: skip
     speed = 2400 * pi / 30
     even = filling(speed, air(2e5), air(2e5), cylinders)

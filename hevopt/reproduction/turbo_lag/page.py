@@ -68,15 +68,25 @@ def _claims(found: TurboLag) -> str:
 
 
 def _claim_of_twice(found: TurboLag) -> list[str]:
-    ratio = found.shipped[SMALL, FOURTH].figures.ratio
-    low, high = _TWICE
+    one = found.shipped[SMALL, FOURTH]
+    ratio, (low, high) = one.figures.ratio, _TWICE
     holds = low <= ratio[0] <= high and list(ratio) == sorted(ratio, reverse=True)
     told = ", ".join(f"{r:.2f} at {t:g} s" for r, t in zip(ratio, TIMES_S, strict=True))
     return [
         f"(a) {FOURTH.text}: a steady model accelerates up to twice as fast, mostly at the start",
         f"{told} times as fast",
-        _AGREES if holds else _DOES_NOT,
+        _AGREES
+        if holds
+        else f"{_DOES_NOT}: {low:g} to {high:g} at {TIMES_S[0]:g} s would; {_twice_until(one)}",
     ]
+
+
+def _twice_until(one: TipIn) -> str:
+    late = one.run.time_s >= TIMES_S[0]
+    more = one.by_map["accel_mps2"][late] > 2.0 * one.run["accel_mps2"][late]
+    if not more.any():
+        return "it is never twice"
+    return f"it is more than twice until {one.run.time_s[late][more][-1]:.2f} s"
 
 
 def _claim_of_patterns(found: TurboLag) -> list[str]:

@@ -10,7 +10,7 @@ from hevopt.reproduction.verdicts import markdown
 from hevopt.tipin.drive import TipIn
 from hevopt.units import RPM_PER_RADPS
 
-_FROM_RPM, _TO_RPM = 1000, 4000
+_FROM_RPM, _TO_RPM = 1000, 4500
 _TORQUE_PERCENT, _FUEL_PERCENT = 4, 6
 
 
@@ -33,13 +33,16 @@ def full_load(found: TurboLag) -> str:
     return (
         f"## 6. Steady full load\n\nWhat full pedal settles to from {_FROM_RPM} to {_TO_RPM} rpm, beside the "
         "file's curve, and its fuel beside the map's at equal torque.\n\n" + markdown(heads, "lrrl", rows)
-        + f"\n\nAbove {_TO_RPM} rpm they part ({'; '.join(beyond)}): the indicated efficiency does not fall with "
-        "speed as the map's does. No tip-in of sections 1 to 5 goes there."
+        + f"\n\nThe curves' last point, above {_TO_RPM} rpm, is apart ({'; '.join(beyond)}): half of the highest "
+        "torque there, where the control unit reckons with gas exchange and combustion of high boost, which is "
+        "not there; torque is above the file's by what that is wrong, as far as the exhaust is not too hot. No "
+        "tip-in of sections 1 to 5 goes there."
     )  # fmt: skip
 
 
 def _span(values: NDArray[np.float64]) -> str:
-    return f"{values.min():+.1f} to {values.max():+.1f}"
+    low, high = f"{values.min():+.1f}", f"{values.max():+.1f}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _within(values: NDArray[np.float64], limit: float) -> str:

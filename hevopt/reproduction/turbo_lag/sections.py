@@ -176,6 +176,11 @@ def _times(times_s: Sequence[float]) -> str:
     return ", ".join(f"{time:g}" for time in times_s)
 
 
+def _span(least: float, most: float) -> str:
+    low, high = f"{least:.0f}", f"{most:.0f}"
+    return low if low == high else f"{low} to {high}"
+
+
 def _verdict(found: TurboLag, pedal: Pedal) -> str:
     """Which machines do it, and what it takes."""
     of = [one for one in found.filled if one.pedal == pedal]
@@ -186,7 +191,7 @@ def _verdict(found: TurboLag, pedal: Pedal) -> str:
         least = min(one.least_w for one in of if one.least_w is not None)
         text += (
             f"the machines of {alike} make the diesel feel like its steady map; {least / 1e3:.0f} kW and "
-            f"{min(work):.0f} to {max(work):.0f} kJ of work are what it takes"
+            f"{_span(min(work), max(work))} kJ of work are what it takes"
         )
     else:
         text += "no machine makes the diesel feel like its steady map"
