@@ -126,7 +126,7 @@ def test_three_smoke_limits_are_three_patterns_at_60_in_sixth():
         tip_in(manoeuvre(kmh=60.0, gear=6), variation("smoke", x)).figures.accel_mps2[TIMES_S.index(1.0)]
         for x in (1.1, 1.25, 1.4)
     ]  # fmt: skip
-    # The design's, by efficiency over speed: at 1190 rpm a mass of fuel does 4 % less, which is 6 % of what is left.
+    # The design's, by efficiency over speed: at 1190 rpm fuel does 4 % less, which is 6 % of what is left.
     assert found == pytest.approx([0.94 * 0.42, 0.94 * 0.36, 0.94 * 0.30], abs=0.015)
 
 
