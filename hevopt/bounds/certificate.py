@@ -51,6 +51,14 @@ class Proof(StrEnum):
     LOWER_BOUND_DP = "lower-bound DP"
 
 
+PROOF_WORDS: dict[str, str] = {
+    Proof.ONE_MULTIPLIER: "one price on stored energy",
+    Proof.COSTATE_PRICES: "one price per step, along the best plan found",
+    Proof.LP_PRICES: "one price per step, of a linear program",
+    Proof.LOWER_BOUND_DP: "a cost-to-go nowhere above the true one",
+}
+
+
 class Scope(StrEnum):
     """What a bound speaks of: the table's controls, or every split between them as well."""
 

@@ -225,7 +225,7 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
     columns = None if wide else width()
     rows = report.comparison_table(comparison, columns)
     show(rows)
-    left = report.left_out(rows)
+    left = report.left_out(comparison, rows)
     notes = [f"left out for want of width: {', '.join(left)}; --wide shows them."] if left else []
     show_notes("\n".join([*notes, report.comparison_notes(comparison, left), *job.cars.said()]))
     if job.cold is not None:

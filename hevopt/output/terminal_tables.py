@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.bounds.certificate import SCOPE_WORDS, Proof
+from hevopt.bounds.certificate import PROOF_WORDS, SCOPE_WORDS
 from hevopt.files.shown import printable
 from hevopt.output.tables import needed_width, titled_table
 from hevopt.studies.comparison import Comparison
@@ -19,6 +19,7 @@ class _Column(NamedTuple):
     """A column of a comparison: head, what a row says in it, and when it leaves a narrow terminal, 0 never.
 
     of: what goes before the head where that alone does not tell the column
+    engines: whether it says nothing of cars that have none
     """
 
     head: str
@@ -26,6 +27,7 @@ class _Column(NamedTuple):
     leaves: int
     justify: Literal["left", "right"] = "right"
     of: str = ""
+    engines: bool = False
 
 
 def _number(name: str, form: str) -> Callable[[Row], str]:
@@ -45,16 +47,21 @@ def _charge(row: Row) -> str:
 
 # The higher, the sooner it leaves.
 _COLUMNS = (
-    _Column("fuel\nl/100km", _number("fuel_l_per_100km", ".3f"), 0),
-    _Column("vs ref\n%", _number("delta_fuel_percent", "+.1f"), 1),
-    _Column("CO2\ng/km", _number("co2_g_per_km", ".1f"), 8),
-    _Column("NOx\nmg/km", _number("nox_mg_per_km", ".0f"), 5),
-    _Column("vs ref\n%", _number("delta_nox_percent", "+.1f"), 9, of="NOx "),
+    _Column("fuel\nl/100km", _number("fuel_l_per_100km", ".3f"), 0, engines=True),
+    _Column("vs ref\n%", _number("delta_fuel_percent", "+.1f"), 1, engines=True),
+    _Column("CO2\ng/km", _number("co2_g_per_km", ".1f"), 8, engines=True),
+    _Column("NOx\nmg/km", _number("nox_mg_per_km", ".0f"), 5, engines=True),
+    _Column("vs ref\n%", _number("delta_nox_percent", "+.1f"), 9, of="NOx ", engines=True),
     _Column("ΔSOC", _charge, 7),
-    _Column("ΔE/fuel\n%", _number("delta_energy_percent", "+.2f"), 4),
-    _Column("corrected\nl/100km", _number("fuel_corrected_l_per_100km", ".3f"), 3),
-    _Column("starts", lambda row: "-" if row.engine_starts is None else str(row.engine_starts), 6),
-    _Column("bound\nl/100km", _number("bound_l_per_100km", ".3f"), 2),
+    _Column("ΔE/fuel\n%", _number("delta_energy_percent", "+.2f"), 4, engines=True),
+    _Column("corrected\nl/100km", _number("fuel_corrected_l_per_100km", ".3f"), 3, engines=True),
+    _Column(
+        "starts",
+        lambda row: "-" if row.engine_starts is None else str(row.engine_starts),
+        6,
+        engines=True,
+    ),
+    _Column("bound\nl/100km", _number("bound_l_per_100km", ".3f"), 2, engines=True),
     _Column("gap\n%", _number("gap_percent", ".3f"), 0),
     _Column(
         "proof",
@@ -67,12 +74,6 @@ _COLUMNS = (
 # Only where another end charge than the start's is asked; before the corrected fuel.
 _BATTERY = _Column("battery\nkWh/100km", _number("electricity_kwh_per_100km", "z.2f"), 0)
 _BATTERY_PLACE = 7
-_PROOFS = {
-    Proof.ONE_MULTIPLIER: "one price on stored energy",
-    Proof.COSTATE_PRICES: "one price per step, along the best plan found",
-    Proof.LP_PRICES: "one price per step, of a linear program",
-    Proof.LOWER_BOUND_DP: "a cost-to-go nowhere above the true one",
-}
 
 
 def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
@@ -81,15 +82,29 @@ def comparison_table(comparison: Comparison, width: int | None = None) -> Table:
     Columns that decide less leave until it is no wider than `width`, and of a failure there is one word, as its
     message is printed apart.
     """
-    columns = [*_COLUMNS, *_forward_columns(comparison)]
-    if comparison.end_asked:
-        columns.insert(_BATTERY_PLACE, _BATTERY)
+    columns = [*_columns(comparison), *_forward_columns(comparison)]
     if width is None or needed_width(_table(comparison, columns)) <= width:
         return _table(comparison, columns)
     leaving = sorted(columns, key=lambda column: column.leaves)
     while leaving[-1].leaves and needed_width(_table(comparison, columns, brief=True)) > width:
         columns.remove(leaving.pop())
     return _table(comparison, columns, brief=True)
+
+
+def _columns(comparison: Comparison) -> list[_Column]:
+    """The columns of a wide table, those of the forward runs apart."""
+    if _electric(comparison):
+        return [_BATTERY, *(column for column in _COLUMNS if not column.engines)]
+    columns = list(_COLUMNS)
+    if comparison.end_asked:
+        columns.insert(_BATTERY_PLACE, _BATTERY)
+    return columns
+
+
+def _electric(comparison: Comparison) -> bool:
+    """Whether no car of it has an engine."""
+    solved = [row for row in comparison.rows if row.solved]
+    return bool(solved) and all(row.electric for row in solved)
 
 
 def _forward_columns(comparison: Comparison) -> list[_Column]:
@@ -112,11 +127,11 @@ def _forward_columns(comparison: Comparison) -> list[_Column]:
     return columns if comparison.forward else []
 
 
-def left_out(table: Table) -> list[str]:
+def left_out(comparison: Comparison, table: Table) -> list[str]:
     """Heads of the columns that have left a comparison's table."""
     shown = [str(column.header) for column in table.columns]
     names = []
-    for column in _COLUMNS:
+    for column in _columns(comparison):
         if column.head in shown:
             shown.remove(column.head)
         else:
@@ -150,25 +165,49 @@ def _table(comparison: Comparison, columns: Sequence[_Column], *, brief: bool = 
 
 def comparison_notes(comparison: Comparison, left: Collection[str] = ()) -> str:
     """What the columns mean, below the table; left: heads of those that have left it."""
+    return (
+        f"{_electric_notes(comparison) if _electric(comparison) else _fuel_notes(comparison)}"
+        f"{_scope_note(comparison)}"
+        f"{_causal_note(comparison)}"
+        f"{'' if 'proof' in left else _proof_note(comparison)}"
+        f"{_foot(comparison)}"
+        f"{_nox_note(comparison)}"
+        f"{_lost_note(comparison)}"
+        f"{_forward_note(comparison)}"
+    )
+
+
+def _fuel_notes(comparison: Comparison) -> str:
+    """Columns of cars that burn fuel."""
     objective = "fuel"
     if comparison.nox_weight:
         objective = f"fuel + {comparison.nox_weight:g} x NOx (in kg), as fuel volume"
-    gears = f"as {comparison.cycle} lists them, else by the car's own shift speeds"
-    if comparison.free_gear:
-        gears = "chosen with the plan"
     return (
         f"vs ref: against {_reference(comparison)}. corrected: fuel less what the end charge is worth "
         "(multiplier of the dual).\n"
         f"{_end_notes(comparison)}"
         f"bound: no plan with that row's end charge has less {objective}; gap: how far the row is above it.\n"
-        f"{_scope_note(comparison)}"
-        f"{_causal_note(comparison)}"
-        f"{'' if 'proof' in left else _proof_note(comparison)}"
-        f"The engine is warm from start to end; gears: {gears}; figures are of this cycle alone."
-        f"{_nox_note(comparison)}"
-        f"{_lost_note(comparison)}"
-        f"{_forward_note(comparison)}"
     )
+
+
+def _electric_notes(comparison: Comparison) -> str:
+    """Columns where no car has an engine."""
+    asked = end_asked_text(comparison.end_asked)
+    return (
+        "battery: stored energy that the drive takes, start less end; gap: how far what the battery gives is above "
+        "a bound that no plan is below.\n"
+        + (f"end charge asked, other than the start's: {asked}.\n" if comparison.end_asked else "")
+    )
+
+
+def _foot(comparison: Comparison) -> str:
+    """What all figures hold for."""
+    if _electric(comparison):
+        return "Figures are of this cycle alone."
+    gears = f"as {comparison.cycle} lists them, else by the car's own shift speeds"
+    if comparison.free_gear:
+        gears = "chosen with the plan"
+    return f"The engine is warm from start to end; gears: {gears}; figures are of this cycle alone."
 
 
 def _forward_note(comparison: Comparison) -> str:
@@ -205,7 +244,7 @@ def _scope_note(comparison: Comparison) -> str:
 def _proof_note(comparison: Comparison) -> str:
     """What the kinds of proof are that rows name."""
     named = {row.certificate.proof for row in comparison.rows if row.certificate is not None}
-    words = [f"{proof} = {word}" for proof, word in _PROOFS.items() if proof in named]
+    words = [f"{proof} = {word}" for proof, word in PROOF_WORDS.items() if proof in named]
     return f"proof: {'; '.join(words)}.\n" if words else ""
 
 
@@ -246,7 +285,7 @@ def _lost_note(comparison: Comparison) -> str:
 
 def _nox_note(comparison: Comparison) -> str:
     rows = comparison.rows
-    unknown = [r for r in rows if r.nox_mg_per_km is None and r.fuel_l_per_100km is not None]
+    unknown = [r for r in rows if r.nox_mg_per_km is None and r.solved and not r.electric]
     if not unknown:
         return ""
     cars = ", ".join(dict.fromkeys(printable(row.architecture) for row in unknown))

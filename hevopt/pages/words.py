@@ -4,15 +4,14 @@ import re
 
 from markupsafe import Markup, escape
 
+from hevopt.bounds.certificate import PROOF_WORDS
+
 WORDS = {
     "tabulated controls": "the torques, gears and clutches that the table of the car lists for each step, "
     "by default 41 torques for each gear and machine",
     "charge-corrected": "fuel less what stored energy beyond that asked at the end is worth",
     "proven lower bound": "a figure that no plan can undercut, whatever the strategy; over which controls is told",
-    "one multiplier": "a bound by one price of stored energy over the whole cycle",
-    "costate prices": "a bound by a price of stored energy for each step, along the best plan found",
-    "LP prices": "a bound by a price of stored energy for each step, from a linear program",
-    "lower-bound DP": "a bound by dynamic programming whose cost-to-go is nowhere above the true one",
+    **{str(proof): f"a bound by {words}" for proof, words in PROOF_WORDS.items()},
     "causal": "decides without knowing the rest of the cycle",
 }
 _ANY = re.compile("|".join(rf"\b{re.escape(word)}\b" for word in WORDS))

@@ -95,6 +95,13 @@ def _why_unreachable(problem: Problem, choices: Choices, end_min_j: float) -> st
             return _reason_at(problem, choices, k)
     best = float(battery_model.soc(problem.battery, top.max()))
     wanted = float(battery_model.soc(problem.battery, end_min_j))
+    if top.max() >= end_min_j:
+        lowest, highest = (float(battery_model.soc(problem.battery, e)) for e in problem.window_j)
+        return (
+            f"no path was found that keeps within the SOC window {lowest:.6g} to {highest:.6g} and ends at SOC "
+            f"{wanted:.6g} or above, though each step alone allows one: steps move about as much as the window "
+            "holds; widen it, or ask for a lower soc_end"
+        )
     return (
         f"the end charge cannot be reached: SOC {wanted:.4f} is asked, {best:.4f} is the most any plan "
         f"reaches at the last step {choices.steps - 1}; ask for a lower soc_end or give the machine more power"

@@ -58,6 +58,11 @@ class Row(Shown):
         """Whether there are figures: the case did not fail."""
         return self.fuel_l_per_100km is not None
 
+    @property
+    def electric(self) -> bool:
+        """Whether it is of a car without an engine: nothing is burnt, and no charge is worth fuel."""
+        return self.solved and self.fuel_corrected_l_per_100km is None
+
     def _facts(self) -> dict[str, object]:
         names = "architecture", "strategy", "fuel_l_per_100km", "bound_l_per_100km"
         return {

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from hevopt import Battery, ControlTable, Problem, certify, simulate, solve
+from hevopt.problem.choices import choices_of
+from hevopt.strategies._rollout import _why_unreachable
 
 
 def charged_once(charge_ohm, asked: float, start: float = 0.0) -> Problem:
@@ -30,3 +32,13 @@ def test_resistance_that_falls_steeply_does_not_either(start):
     for asked in (0.999 * ended, 0.7 * ended):
         reached = charged_once([100, 0], float(asked), start)
         assert simulate(reached, solve(reached).control).soc[-1] == ended
+
+
+def test_what_is_said_where_no_path_is_found_does_not_contradict_itself():
+    problem = charged_once([100, 0], 0.0)
+    choices = choices_of(problem)
+    asked_j = float(simulate(problem, np.zeros(1, np.int64)).end_j)
+    within = _why_unreachable(problem, choices, 0.5 * asked_j)
+    beyond = _why_unreachable(problem, choices, 1.01 * asked_j)
+    assert "no path was found that keeps within the SOC window 0 to 1" in within
+    assert "the most any plan" not in within and "the most any plan" in beyond

@@ -33,19 +33,22 @@ def assumptions(results: Results) -> list[Assumption]:
     known = list(_known(results))
     if not known:
         return []
+    burns = any(one.about.engine_shaft is not None for one in known)
     found = [
         Assumption(
             "The engine, its oil and its catalyst are warm from start to end.",
-            ["not modelled, so no figure"],
+            ["not modelled, so no figure"] if burns else [],
             "too good, most on short cycles",
         ),
         _starts(known),
         _braking(results, known),
         _gears(known),
         Assumption(
-            "The cycle's speed is met exactly, and fuel and NOx are those of a steady load.",
+            "The cycle's speed is met exactly, and fuel and NOx are those of a steady load."
+            if burns
+            else "The cycle's speed is met exactly.",
             ["not modelled, so no figure"],
-            "either; NOx too good where load changes fast",
+            "either; NOx too good where load changes fast" if burns else "either",
         ),
         _figures(results),
     ]
@@ -170,6 +173,8 @@ def _gears(known: list[_Known]) -> Assumption:
             )
             text += f"; {_span(changes, '.0f')} changes, {gap}"
         lines.append((name, text))
+    if all(one.about.gears == "none" for one in known):
+        lines = []
     return Assumption(
         "Gears are not part of what is optimised, but where they are chosen with the plan; a manual gearbox "
         "interrupts.",

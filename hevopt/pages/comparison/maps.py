@@ -29,7 +29,7 @@ def engine_map(car: Architecture) -> MapFigures:
         speed_radps=_rounded(speed, 3),
         torque_nm=_rounded(torque, 3),
         efficiency=_nested(efficiency, 5),
-        nox_kgpj=_nested(nox, 14) if np.nanmax(nox) > 0 else None,
+        nox_kgpj=_nested(nox, 14) if np.nanmax(nox, initial=0.0) > 0 else None,
         limit_nm=_rounded(engine.full_load_nm(speed), 3),
         least_nm=_nested(engine.drag_nm(speed)[None, :], 3)[0],
     )

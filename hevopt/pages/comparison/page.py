@@ -4,12 +4,18 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from hevopt.bounds.certificate import SCOPE_WORDS
+from hevopt.bounds.certificate import PROOF_WORDS, SCOPE_WORDS
 from hevopt.pages.comparison.alerts import alerts
 from hevopt.pages.comparison.assumptions import assumptions
 from hevopt.pages.comparison.results import Item, Results, SavedRow, Sensitivity
 from hevopt.pages.comparison.sketch import sketch_of
-from hevopt.pages.comparison.verdict import best_rows, charge_asked, reference_row, verdict
+from hevopt.pages.comparison.verdict import (
+    all_electric,
+    best_rows,
+    charge_asked,
+    reference_row,
+    verdict,
+)
 from hevopt.pages.render import render
 from hevopt.studies.rows import marked
 from hevopt.studies.sensitivity import unsolved
@@ -47,6 +53,8 @@ def comparison_page(results: Results) -> str:
         table=[_figures(row, scope) for row in results.rows],
         scope=scope,
         scope_words=SCOPE_WORDS,
+        proofs=_proofs(results),
+        electric=all_electric(results),
         worth=[_worth(results, row) for row in results.rows if row.detail is not None],
         energy=[_BalanceTable.of(results, row) for row in results.rows if row.detail is not None],
         spells=[_spells(row) for row in results.rows if row.detail is not None],
@@ -72,6 +80,13 @@ def _left_out(results: Results) -> list[str]:
         ("sensitivity (hevopt compare --sensitivity adds it)", results.sensitivity),
     )
     return [text for text, found in options if not found]
+
+
+def _proofs(results: Results) -> list[tuple[str, str]]:
+    """Kinds of proof that rows name, with what each is."""
+    claims = [row.figures.certificate for row in results.rows]
+    named = {str(claim.proof) for claim in claims if claim is not None}
+    return [(str(proof), words) for proof, words in PROOF_WORDS.items() if proof in named]
 
 
 def _scope(results: Results) -> str:

@@ -42,6 +42,11 @@ class RowFigures(FileModel):
     certificate: SavedClaim | None
     solve_s: Number | None
 
+    @property
+    def electric(self) -> bool:
+        """Whether it is a solved row of a car without an engine, as `rows.Row.electric`."""
+        return self.fuel_l_per_100km is not None and self.fuel_corrected_l_per_100km is None
+
 
 class SavedTrace(FileModel):
     """What a row does, (time,), but soc: (time + 1,). operation: index into the names of `operations`."""

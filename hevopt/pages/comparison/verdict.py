@@ -17,6 +17,12 @@ _PERCENT = "\u00a0%"
 _VOLUME = "\u00a0l/100\u00a0km"
 
 
+def all_electric(results: Results) -> bool:
+    """Whether no car of it has an engine."""
+    solved = [row.figures for row in results.rows if row.detail is not None]
+    return bool(solved) and all(row.electric for row in solved)
+
+
 def corrected_cost(row: RowFigures) -> float | None:
     """Objective of a row as fuel volume, charge-corrected: l/100 km of fuel and weighted NOx."""
     if row.fuel_corrected_l_per_100km is None or row.fuel_l_per_100km is None:
@@ -61,6 +67,8 @@ def best_rows(results: Results) -> list[RowFigures]:
     rows = [row for row in solved if row.status.ok] or solved
     if not rows:
         return []
+    if all_electric(results):
+        return sorted(rows, key=lambda row: row.electricity_kwh_per_100km or 0.0)
     near = (1 + _EQUAL_PERCENT / 100) * min(map(_corrected, rows))
     equal = [row for row in rows if _corrected(row) <= near]
     return sorted(equal, key=lambda row: (abs(row.delta_energy_percent or 0.0), cost(row)))
@@ -74,12 +82,27 @@ def verdict(results: Results) -> list[str]:
     equal = best_rows(results)
     if not equal:
         return ["No case could be solved on this cycle.", "The reasons are listed below."]
+    if all_electric(results):
+        return _electric(results, equal[0])
     return [
         _first(results, equal[0], equal[1:]),
         _second(results, equal[0]),
         *_causal(results, equal),
         *charge_asked(results),
     ]
+
+
+def _electric(results: Results, best: RowFigures) -> list[str]:
+    """The row that takes least from the battery, where no car has an engine."""
+    said = [
+        f"On {results.cycle}, {best.architecture} with {best.strategy} takes the least from its battery: "
+        f"{fixed(best.electricity_kwh_per_100km, '.2f')}\u00a0kWh/100\u00a0km."
+    ]
+    if best.gap_percent is not None:
+        said.append(
+            f"What its battery gives lies {max(best.gap_percent, 0.0):.3f}{_PERCENT} above a proven lower bound."
+        )
+    return said
 
 
 def _first(results: Results, best: RowFigures, equal: list[RowFigures]) -> str:
@@ -133,7 +156,7 @@ def _change(results: Results, best: RowFigures) -> str:
 
 
 def _second(results: Results, best: RowFigures) -> str:
-    if best.gap_percent is None:
+    if best.gap_percent is None or best.bound_l_per_100km is None:
         if best.bound_l_per_100km is None:
             return "There is no bound to hold it against."
         if is_nothing(best):
