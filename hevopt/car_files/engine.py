@@ -17,6 +17,7 @@ from hevopt.car_files.fields import (
     Specific,
     Speeds,
     StartFuel,
+    check_efficiency,
     check_grid,
 )
 from hevopt.car_files.mean_value import MeanValueFile
@@ -110,6 +111,20 @@ class EngineFile(FileModel):
             raise ValueError(
                 f"idle_rpm {self.idle_rpm:g} must lie within full_load.speed_rpm, {low:g} to {high:g}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _efficiency(self) -> Self:
+        """Most of a map, up to full load, gives no more power than its fuel holds, and some of it a share."""
+        grid = self.fuel_map
+        if grid is not None:
+            speed, torque = np.array(grid.speed_rpm)[:, None], np.array(grid.torque_nm)
+            fuel_kw = np.array(grid.fuel_gps) * self.fuel.heating_value_mjpkg
+            full = np.interp(speed, self.full_load.speed_rpm, self.full_load.torque_nm)
+            used = (torque > 0) & (torque <= full) & (speed >= self.idle_rpm) & (fuel_kw > 0)
+            power_kw = speed * pi / 30 * torque / 1e3
+            hint = "fuel_map.fuel_gps is in g/s, torque_nm in Nm, heating_value_mjpkg in MJ/kg"
+            check_efficiency(power_kw[used] / fuel_kw[used], hint)
         return self
 
     @model_validator(mode="after")

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from hevopt.files.toml import SHAPES, FileModel, shape_of
 
 _MAP_MAX = 1e6
+_EFFICIENCY_MIN = 0.01
+Array = NDArray[np.float64]
 
 
 def _on_one_line(text: str) -> str:
@@ -54,6 +57,18 @@ def check_grid(name: str, grid: list[list[float]], rows: int, columns: int) -> N
         raise ValueError(f"{name} holds nan only; give the measured values")
     if not (np.isnan(values) | ((values >= 0) & (values <= _MAP_MAX))).all():
         raise ValueError(f"{name}: allowed: 0 to {_MAP_MAX:g}, or nan where not measured")
+
+
+def check_efficiency(share: Array, hint: str) -> None:
+    """ValueError where an efficiency, (point,), is above 1 in most points, or nowhere 0.01: units are mistaken."""
+    if not len(share):
+        return
+    middle, best = float(np.median(share)), float(np.max(share))
+    if middle > 1 or best < _EFFICIENCY_MIN:
+        found = (
+            f"most are above {100 * middle:.3g}" if middle > 1 else f"the best is {100 * best:.3g}"
+        )
+        raise ValueError(f"of efficiencies {found} %; allowed: 1 to 100 %; {hint}")
 
 
 @dataclass(frozen=True)

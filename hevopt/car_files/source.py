@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from hevopt.car.engine import Engine
 from hevopt.car.source import SourceLaw, source_as_engine
 from hevopt.car_files.engine import Dwell, FuelFile
-from hevopt.car_files.fields import Name, NotNegative, StartFuel
+from hevopt.car_files.fields import Name, NotNegative, StartFuel, check_efficiency
 from hevopt.files.toml import FileModel
 from hevopt.units import TO_SI
 
@@ -28,17 +28,19 @@ class SourceFile(FileModel):
 
     @model_validator(mode="after")
     def _points(self) -> Self:
-        """Powers from 0 up, fuel that rises with them, and never more power than the fuel holds."""
+        """Powers from 0 up, fuel that rises with them, and power that such fuel can give."""
         power, fuel = np.array(self.power_kw), np.array(self.fuel_gps)
         if len(power) != len(fuel):
             raise ValueError(f"power_kw has {len(power)} values and fuel_gps {len(fuel)}")
         if power[0] != 0 or (np.diff(power) <= 0).any() or (np.diff(fuel) <= 0).any():
             raise ValueError("power_kw must begin at 0 and increase, and fuel_gps with it")
-        if (over := power > fuel * self.fuel.heating_value_mjpkg).any():
-            raise ValueError(
-                f"{power[np.argmax(over)]:g} kW is more than its fuel holds; fuel_gps is in g/s, "
-                "heating_value_mjpkg in MJ/kg"
-            )
+        fuel_kw, hint = (
+            fuel * self.fuel.heating_value_mjpkg,
+            "fuel_gps is in g/s, heating_value_mjpkg in MJ/kg",
+        )
+        if (over := power > fuel_kw).any():
+            raise ValueError(f"{power[np.argmax(over)]:g} kW is more than its fuel holds; {hint}")
+        check_efficiency(power[1:] / fuel_kw[1:], hint)
         return self
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hevopt import InfeasibleError, build_problem, load_architecture
+from hevopt import DataError, InfeasibleError, build_problem, load_architecture
 from hevopt.car.engine_laws import EngineMap
 from hevopt.car.machine_laws import LossMap
 from hevopt.driving.cycle import Cycle
@@ -25,6 +25,15 @@ def sampled(car, low_rpm: float, high_rpm: float, *, nox_to_nm: float = np.inf):
     drag = car.engine.drag_nm(speed)
     grid = EngineMap(speed, TORQUE, car.engine.fuel_kgps(*mesh), nox, drag)
     return replace(car, engine=replace(car.engine, law=grid))
+
+
+def test_a_map_in_other_units_is_one_message():
+    fuel = load_architecture("p2_petrol_dct").contents["engine"]["fuel_map"]["fuel_gps"]
+    for factor, words in ((3600, "the best is 0.0"), (1 / 60, "most are above")):
+        changed = {"engine.fuel_map.fuel_gps": [[factor * value for value in row] for row in fuel]}
+        with pytest.raises(DataError, match=words) as found:
+            load_architecture("p2_petrol_dct", changed)
+        assert "allowed: 1 to 100 %; fuel_map.fuel_gps is in g/s" in str(found.value)
 
 
 def braking(car, rpm: float, gear: int = 2) -> Cycle:

@@ -4,6 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from split_cars import short
 
 from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
 from hevopt.driving.cycle import Cycle
@@ -97,3 +98,16 @@ def test_doubled_inertias_are_never_better(name, problem_of):
     burnt = simulate(plain, solve(plain).control)
     at_least, _ = certify(heavy).bound_kg(heavy.end_min_j)
     assert at_least > burnt.cost_kg * (1.001 if name != "D" else 1)
+
+
+@pytest.mark.parametrize("name", ["prius_1998", "series_1500", "p0_p4_diesel", "p2_petrol_dct"])
+def test_doubled_inertias_are_never_better_with_other_topologies(name):
+    car = load_architecture(name)
+    changes = {"engine.inertia_kgm2": 2 * car.engine.inertia_kgm2}
+    for (key, _), machine in zip(car.driveline.machines, car.machines, strict=True):
+        changes[f"{key}.inertia_kgm2"] = 2 * machine.inertia_kgm2
+    cycle = short("udds", 330)
+    plain, heavy = (build_problem(c, cycle) for c in (car, load_architecture(name, changes)))
+    burnt = simulate(plain, solve(plain).control)
+    at_least, _ = certify(heavy).bound_kg(heavy.end_min_j)
+    assert at_least > burnt.cost_kg

@@ -86,6 +86,10 @@ def test_the_rules_of_series_cars_drive_it(solved):
         (("0.682]", "0.5]"), None),
         (("0.01, 0.036", "0.001, 0.0012"), "2 kW is more than its fuel holds"),
         (("0.682", "nan"), "fuel_gps"),
+        (
+            ("[0.01, 0.036, 0.075, 0.208, 0.437, 0.682]", "[36, 130, 270, 749, 1573, 2455]"),
+            "the best is 0.0167 %; allowed: 1 to 100 %; fuel_gps is in g/s",
+        ),
     ],
 )
 def test_maps_that_make_no_sense_are_one_message(tmp_path, change, message):

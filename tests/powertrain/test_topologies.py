@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from split_cars import short, table_value
 
-from hevopt import load_architecture
+from hevopt import build_problem, load_architecture, load_cycle, simulate
 from hevopt.car.balance import joints_of
 from hevopt.car.driveline import BRAKE, ENGINE, Driveline, State
 from hevopt.car.parts import WHEEL, Clutch, Gear, Planetary, ShaftBrake
@@ -18,6 +18,7 @@ from hevopt.powertrain.evaluated import evaluated
 from hevopt.powertrain.operation import setting
 from hevopt.powertrain.phases import Phase, driver_of, stretches
 from hevopt.powertrain.shafts import shafts_of
+from hevopt.strategies import STRATEGIES, fitting
 from hevopt.studies.case import prepare
 
 PRIUS = load_architecture("prius_1998")
@@ -189,6 +190,43 @@ def test_a_shipped_hybrid_is_solved_and_proven(name):
     bound_kg, _ = case.certificate.bound_of(plan)
     assert 0 <= plan.cost_kg / bound_kg - 1 < 1e-3
     assert max(np.max(np.abs(residual)) for residual in plan.residuals.values()) < 1e-6
+
+
+# A part of a cycle is enough for every way to drive; whole cycles, with all strategies, are the long test.
+@pytest.mark.parametrize(
+    ("name", "cycle"),
+    [("prius_1998", "udds 200"), ("p0_p4_diesel", "udds 200")]
+    + [
+        pytest.param(name, cycle, marks=pytest.mark.long)
+        for name in HYBRIDS
+        for cycle in ("nedc", "wltc_class3b", "udds", "us06")
+    ],
+)
+def test_energy_closes_with_every_strategy(name, cycle):
+    """Fuel, charge and what shafts hold at the start against everything spent, to 1e-9 of what was taken."""
+    car, (cycle, *part) = load_architecture(name), cycle.split()
+    trace = short(cycle, int(part[0])) if part else load_cycle(cycle)
+    problem = build_problem(car, trace, allow_shortfall=True)
+    for strategy in fitting(car.marks, every=not part):
+        learnt = {"training": [problem]} if strategy == "sdp" else {}
+        run = simulate(problem, STRATEGIES[strategy].solve(problem, **learnt).control)
+        f, heat = run.flows, car.engine.heating_value_jpkg
+        taken = (
+            heat * run.total_fuel_kg + f["shafts_before_j"][0] + run.energy_j[0] - run.energy_j[-1]
+        )
+        on = np.array([True, *(problem.table.controls[c].engine_on for c in run.control)])
+        spent = car.engine.start_fuel_kg * heat * np.sum(on[1:] & ~on[:-1])
+        changed = run.switch_fuel_kg * heat - f["spin_fuel_j"]
+        changed -= car.engine.start_fuel_kg * heat * (on[1:] & ~on[:-1])
+        spent += np.sum(changed) + np.sum(f["spin_loss_j"]) + f["shafts_end_j"][-1]
+        for flow in (
+            "engine_loss_w", "clutch_loss_w", "gearbox_loss_w", "gear_loss_w", "machine_loss_w",
+            "brake_power_w", "battery_loss_w", "auxiliary_power_w", "wheel_power_w",
+        ):  # fmt: skip
+            spent += np.sum(f[flow] * problem.table.step_s)
+        assert abs(taken - spent) < 1e-9 * (abs(taken) + 1e6), strategy
+        for component, residual_w in run.residuals.items():
+            assert np.max(np.abs(residual_w)) < 1e-6, (strategy, component)
 
 
 @pytest.mark.parametrize(
