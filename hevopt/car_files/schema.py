@@ -67,12 +67,21 @@ def _table(name: str, table: dict[str, Any]) -> dict[str, Any]:
         if found.get("default", "") is None:
             del found["default"]
         found.pop("title", None)
-        if {"additionalProperties": True, "type": "object"} in found.get("oneOf", []):
+        if any(map(_any_table, found.get("oneOf", []))):
             found = {"oneOf": [_NAMED, _file_and_changes(MODELS[kind_of(key)].__name__)]}
         keys[key] = {"description": f"{meaning} ({unit})" if unit.strip("-") else meaning} | found
         if unit:
             keys[key]["x-unit"] = unit
     return {k: v for k, v in table.items() if k != "title"} | {"properties": keys}
+
+
+def _any_table(shape: dict[str, Any]) -> bool:
+    """Whether a table of whatever keys is meant; pydantic before 2.11 does not say that all are allowed."""
+    return (
+        shape.get("type") == "object"
+        and shape.get("additionalProperties", True) is True
+        and "properties" not in shape
+    )
 
 
 def _file_and_changes(name: str) -> dict[str, Any]:
