@@ -28,7 +28,7 @@ def test_as_json_it_is_the_same(hevopt):
     told = json.loads(seen.out)
     base, heavy = (case["figures"] for case in told["cases"])
     assert 1.5 < heavy["boost_90_s"] / base["boost_90_s"] < 1.9
-    assert base["ratio"][0] == pytest.approx(2.1, abs=0.1)
+    assert 1.8 < base["ratio"][0] < 2.3
     assert told["failed"] == {}
 
 
