@@ -15,6 +15,8 @@ What it has found, all mended since:
 - Stores and saved comparisons, changed value by value: KeyError, ZeroDivisionError, OverflowError, AttributeError,
   UnicodeEncodeError and ValueError of `report` and `sweep`; a view without an end; lists of 11 GB.
 - `coastdown` named every column of a file with thousands, in a message of 22 000 characters.
+- NOx of one speed alone divided by zero on the way to its message; units in a log of signals reached the terminal
+  with their control characters.
 """
 
 import argparse

@@ -41,7 +41,7 @@ def signals_table(path: Path, header: Row, rows: Iterable[Row]) -> Table:
             short += [line] if any(cells) else []
             continue
         unit = cells[place[_UNIT]] if place.get(_UNIT, len(cells)) < len(cells) else ""
-        of, texts = found.setdefault((cleaned(cells[place[_NAME]]), unit.strip()), ([], []))
+        of, texts = found.setdefault((cleaned(cells[place[_NAME]]), cleaned(unit)), ([], []))
         of.append(len(times))
         texts.append(cells[place[_VALUE]])
         times.append(cells[place[_TIME]])

@@ -55,6 +55,11 @@ def test_a_signal_in_two_units_is_two_signals(tmp_path):
     assert "columns Vehicle speed [km/h], Vehicle speed [mph] could all be meant" in said
 
 
+def test_a_unit_with_control_characters_is_quoted_printable(tmp_path):
+    said = refusal(tmp_path, log() + row(40_060.25, "Vehicle speed", 60, "km\x03h"))
+    assert "columns Vehicle speed [km/h], Vehicle speed [km?h] could all be" in said
+
+
 def test_a_value_that_is_no_number_is_a_fault_of_its_line(tmp_path):
     text = log().replace('"Vehicle speed";"7"', '"Vehicle speed";"off"')
     assert "line 31: speed is 'off'" in refusal(tmp_path, text)
