@@ -65,6 +65,12 @@ def steady_state(
             found[s.DYNAMIC :] = 0.0
             _check_stable(held(model), found)
             return found
+    if steps >= _STEPS_MAX:
+        step_us = 1e6 * longest_step_s(0.0, y, thin)
+        raise SolverError(
+            f"the engine does not settle at {engine_radps * 30 / np.pi:.0f} rpm: its gas path asks for steps of "
+            f"{step_us:.2g} µs; check units and size of volumes, pressure losses and areas of its file"
+        )
     raise SolverError(
         f"the engine does not settle at {engine_radps * 30 / np.pi:.0f} rpm: after {_MARCH_S * marched:g} s its "
         "rates still change; check the control unit's gains, vanes and smoke limit"

@@ -11,6 +11,7 @@ from plain_engine import PlainCar
 
 from hevopt import DataError, SolverError
 from hevopt.files.lookup import shipped_folder
+from hevopt.mean_value import settle
 from hevopt.mean_value import states as s
 from hevopt.mean_value._cylinder_kernels import work_per_fuel
 from hevopt.mean_value._run_kernels import TABLEAUX, march, observe, rates
@@ -345,7 +346,9 @@ def test_a_speed_that_the_gear_does_not_fit_is_one_message(gear, kmh, words):
         cruise(in_gear("compact_1300", gear), kmh / 3.6)
 
 
-def test_an_engine_that_is_slow_to_settle_settles_and_one_that_never_does_is_one_message():
+def test_an_engine_that_is_slow_to_settle_settles_and_one_that_never_does_is_one_message(
+    monkeypatch,
+):
     model = bench()
     control = model.control
     slow = model._replace(
@@ -354,6 +357,14 @@ def test_an_engine_that_is_slow_to_settle_settles_and_one_that_never_does_is_one
     y = steady_state(held(slow), 2000 * RPM)
     usual = told(model, steady_state(held(model), 2000 * RPM))
     assert told(slow, y)["p3_pa"] == pytest.approx(usual["p3_pa"], rel=1e-6)
+    monkeypatch.setattr(settle, "_STEPS_MAX", 5_000)
+    monkeypatch.setattr(settle, "_MARCH_S", 0.01)
+    losses = model.engine.restrictions._replace(filter_h=2.5)
+    with pytest.raises(
+        SolverError, match=r"gas path asks for steps of .* µs; check units and size"
+    ):
+        steady_state(held(with_engine(model, restrictions=losses)), 2000 * RPM)
+    monkeypatch.undo()
     wild = control._replace(boost_gain_ppa=50 * control.boost_gain_ppa, vanes_lag_s=1.0)
     swinging = model._replace(control=wild)
     with pytest.raises(

@@ -60,6 +60,8 @@ _NEEDED = ("speed", "flow", "ratio", "efficiency")
 # Speeds closer than this are one line.
 _LINE_SHARE = 0.02
 _LINES_MIN, _PER_LINE_MIN = 2, 3
+# Best efficiency below which per cent have been read as parts of a hundredth.
+_EFFICIENCY_MIN = 0.1
 _REFERENCE_K, _REFERENCE_PA = (200.0, 1500.0), (2e4, 1e6)
 
 
@@ -143,6 +145,12 @@ def _check_values(measured: Measured, values: Mapping[str, Array]) -> None:
         low, high, words = allowed[role]
         good = np.isfinite(found) & (found > low) & (found <= high)
         check_rows(measured, role, found, good, words)
+    best = float(values["efficiency"].max())
+    if best < _EFFICIENCY_MIN:
+        raise DataError(
+            f"{measured.path}: the highest efficiency is {best:.3g}; allowed: {_EFFICIENCY_MIN:g} to 1, which is "
+            "100 %; correct the unit in the header, or give it with --unit efficiency=-"
+        )
 
 
 def _reduced(

@@ -150,6 +150,10 @@ BAD = {
         "ratio 0.* allowed: above 1 to 20",
     ),
     "per cent as share": ([(c := own_lines())[0], c[1], c[2], 100 * c[3]], "efficiency 5.*allowed: above 0"),
+    "shares as per cent": (
+        [(c := own_lines())[0], c[1], c[2], c[3] / 100],
+        r"the highest efficiency is 0.00\d+; allowed: 0.1 to 1, which is 100 %; correct the unit",
+    ),
     "no flow": (with_values(1, 3, 0.0), "line 5: flow 0; allowed: above 0"),
     "an empty cell": (with_values(2, 4, np.nan), "line 6: no ratio; allowed"),
     "a wheel too small": (own_lines(), "flow number 2.* of the rim speed; allowed: 0.0001 to 2; check units"),
