@@ -52,7 +52,7 @@ def without_source(text):
         own = STATUS.findall(said)
         sourced = "[E" in said or any(source in said for source in SOURCES) or "http" in said
         sourced = sourced or bool(
-            re.search(r"\w+\.(com|ca|co\.za|online)\b|maker|unit|in its file", said)
+            re.search(r"\w+\.(com|ca|co\.za|online|net)\b|maker|unit|in its file", said)
         )
         sourced = sourced or ("Source A" in named and "[S" in said)
         if not own or not sourced:

@@ -5,7 +5,7 @@ is charge-corrected; the bound is that of plans which end with the charge of the
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +15,11 @@ from hevopt.car_files.load import load_architecture
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle, load_cycle
 from hevopt.driving.demand import demand_of
-from hevopt.powertrain.powertrain import build_problem
 from hevopt.problem.arrays import Array
 from hevopt.problem.problem import Trajectory
-from hevopt.problem.simulation import simulate
 from hevopt.reproduction.validation.laboratory import Laboratory, about, changed, laboratories
-from hevopt.strategies import strategy_named
 from hevopt.studies.case import Case, litres, prepare
-from hevopt.studies.rows import Row, row_of, shortfall_steps
+from hevopt.studies.rows import Row, shortfall_steps
 from hevopt.studies.settings import Settings
 from hevopt.studies.solved import run_case
 
@@ -43,7 +40,7 @@ class EngineUse(NamedTuple):
 class Before(NamedTuple):
     """A car's file as it was when first results were seen: what was changed since, and the fuel, l/100 km."""
 
-    change: str
+    changes: tuple[str, ...]
     causal_l_per_100km: float
 
 
@@ -156,17 +153,13 @@ def _engine_use(case: Case, trajectory: Trajectory) -> EngineUse:
 
 
 def _before(case: Case, causal: str) -> Before | None:
-    """The causal strategy in the car as its file was; charge is worth what it is worth in the car as it is."""
+    """The causal strategy in the car as its file was."""
     change = changed().get(case.car.name)
     if change is None:
         return None
     car = load_architecture(case.car.source, change.values)
-    problem = build_problem(car, case.cycle, allow_shortfall=True)
-    plan = strategy_named(causal).solve(problem)
-    row = row_of(
-        replace(case, car=car, problem=problem), causal, simulate(problem, plan.control), 0.0
-    )
-    return Before(change.said, fuel(row))
+    before = prepare(car, case.cycle, Settings(allow_shortfall=True))
+    return Before(change.said, fuel(run_case(before, causal)[0]))
 
 
 def _load(case: Case, bound_kg: float, other_w: float) -> float:

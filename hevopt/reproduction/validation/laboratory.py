@@ -1,12 +1,13 @@
 """What laboratories measured on the real cars: tables beside their files, put together per car and cycle."""
 
 import csv
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from statistics import fmean
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError, unknown_name
@@ -51,8 +52,8 @@ class About(NamedTuple):
 class Changed(NamedTuple):
     """What of a car's file was changed after the first results were seen: keys with the values before, and why."""
 
-    values: dict[str, float]
-    said: str
+    values: dict[str, Any]
+    said: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -121,14 +122,13 @@ def about() -> dict[str, About]:
 
 @cache
 def changed() -> dict[str, Changed]:
-    """Car -> what of its file was changed after the first results were seen."""
-    return {
-        row["car"]: Changed(
-            {key: float(row[f"value_{n}"]) for n in (1, 2) if (key := row[f"key_{n}"])},
-            row["change"],
-        )
-        for row in _rows("changed.csv")
-    }
+    """Car -> what of its file was changed after the first results were seen; values as in TOML."""
+    rows, found = _rows("changed.csv"), {}
+    for car in dict.fromkeys(row["car"] for row in rows):
+        own = [row for row in rows if row["car"] == car]
+        values = {row["key"]: tomllib.loads(f"value = {row['value']}")["value"] for row in own}
+        found[car] = Changed(values, tuple(row["change"] for row in own if row["change"]))
+    return found
 
 
 def laboratories(
