@@ -2,15 +2,15 @@
 
 An engine of free speed that is to give more runs more often at its best: a joule at the battery takes
 1 / (heating value x best efficiency x efficiency on the way). Where the engine reaches the wheels by way of its
-generator alone, both count together, at the best point of the two; else the machine has 0.94 [E].
+generator alone, both count together, at the best point of the two; else the machine has the usual one.
 """
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.machine import Machine
+from hevopt.problem.problem import MACHINE_EFFICIENCY
 
-_MACHINE_EFFICIENCY = 0.94
 _SPEEDS, _TORQUES = 101, 100
 
 
@@ -30,7 +30,7 @@ def storing_kgpj(car: Architecture) -> float | None:
 
 def _usual(car: Architecture) -> float:
     converted = 1.0 if car.converter is None else float(car.converter.efficiency.max())
-    return car.engine.best_efficiency * _MACHINE_EFFICIENCY * converted
+    return car.engine.best_efficiency * MACHINE_EFFICIENCY * converted
 
 
 def _generating(car: Architecture, machine: Machine) -> float:

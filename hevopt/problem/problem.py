@@ -20,6 +20,9 @@ from hevopt.problem.reject import Reject
 from hevopt.problem.table import ControlTable
 from hevopt.problem.thresholds import OPEN, Thresholds
 
+# [E] of a machine between its shaft and the battery, where no map of its own is asked.
+MACHINE_EFFICIENCY = 0.94
+
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
