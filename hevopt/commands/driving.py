@@ -53,7 +53,8 @@ def drive(
 ) -> None:
     """A strategy driven forward, with driver, clutch and tyres, beside the backward run.
 
-    conventional, nox_cut, a_ecms, sdp and mpc decide on the way; of all others the plan is replayed.
+    conventional, nox_cut, power_follower, thermostat, a_ecms, sdp and mpc decide on the way; of all others the plan
+    is replayed.
     """
     from hevopt.commands.comparing import ComparisonJob
     from hevopt.driving.cycle import load_cycle

@@ -174,13 +174,13 @@ def inputs_of(
 
 
 @compiled(inline="always")
-def _friction_nm(car: LoopCar, asked: AskedStep, speed_mps: float) -> float:
-    """What the friction brakes take at least while the machine may brake as well, at the wheels."""
-    if not asked.braking or asked.wheel_nm >= 0.0:
+def friction_nm(car: LoopCar, wheel_nm: float, speed_mps: float) -> float:
+    """What the friction brakes take at least while a machine may brake as well, at the wheels; 0 while driving."""
+    if wheel_nm >= 0.0:
         return 0.0
     weight_n = car.body.mass_kg * STANDARD_GRAVITY_MPS2
-    rate = -asked.wheel_nm / (car.body.radius_m * weight_n)
-    return -asked.wheel_nm * (1.0 - share_of_braking(speed_mps, rate, car.limits))
+    rate = -wheel_nm / (car.body.radius_m * weight_n)
+    return -wheel_nm * (1.0 - share_of_braking(speed_mps, rate, car.limits))
 
 
 @compiled(inline="always")
@@ -209,7 +209,7 @@ def split_of(
         wheel_nm = asked.wheel_nm + (0.0 if cut else per_nm * pace)
         asked = AskedStep(wheel_nm, asked.accel, set_nm, low, high, asked.least_nm, asked.most_nm,
                       asked.braking, asked.lost_nm)  # fmt: skip
-    friction = _friction_nm(car, asked, state.speed_mps)
+    friction = friction_nm(car, asked.wheel_nm if asked.braking else 0.0, state.speed_mps)
     asked = AskedStep(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
                   asked.least_nm, asked.most_nm, asked.braking, asked.lost_nm)  # fmt: skip
     closed = joint.closing > 0.0

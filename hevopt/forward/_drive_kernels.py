@@ -39,7 +39,7 @@ ENGINE, MACHINE, CLUTCH, WHEEL, BRAKE, HELD, TYRE, ROAD = range(7, 15)
 # and its driver: force asked for, as numbers of _motor_kernels the engine's phase and why the clutch slips; whether
 # all is given and too little; and the directions in which power passed the joints
 ASKED, PHASE, CAUSE, FULL, VARIANT = range(15, 20)
-# Torque lost in a gearbox with a map, at its input.
+# Torque lost in a gearbox with a map, at its input; behind it the torques of machines beyond the first.
 LOST = 20
 COLUMNS = 21
 
@@ -81,7 +81,9 @@ class Look(NamedTuple):
 @compiled()
 def work_of(ways: Ways) -> Work:
     """Room for the loop's work."""
-    return Work(settled_rows(ways), np.empty(row_length(ways)), np.zeros(1))
+    return Work(
+        settled_rows(ways), np.empty(row_length(ways)), np.zeros(len(ways.inertia_kgm2) - 2)
+    )
 
 
 @compiled()

@@ -49,6 +49,22 @@ class Limits(NamedTuple):
     regenerates: bool
 
 
+class Motors(NamedTuple):
+    """Curves of every machine over even steps of its speed, and what the battery gives and takes at its terminals.
+
+    step_radps, most_nm, top_radps: (machine,); limit_nm: (machine, speed)
+    loss_w: (machine, speed, torque) from -most_nm to most_nm
+    """
+
+    step_radps: Array
+    limit_nm: Array
+    loss_w: Array
+    most_nm: Array
+    top_radps: Array
+    least_w: float
+    most_w: float
+
+
 class Gives(NamedTuple):
     """Lowest and highest torque of the engine in a step."""
 
@@ -102,19 +118,41 @@ def share_of_braking(speed_mps: float, rate: float, limits: Limits) -> float:
 
 
 @compiled(inline="always")
-def electric_w(torque: float, speed: float, limits: Limits) -> float:
-    """Electric power of the machine, by its tabulated loss."""
-    rows, columns = limits.loss_w.shape
+def drawn_w(torque: float, speed: float, loss_w: Array, step: float, most_nm: float) -> float:
+    """Electric power of a machine whose loss is tabulated: (speed, torque) from -most_nm to most_nm.
+
+    Turning backwards it is the mirrored one.
+    """
+    rows, columns = loss_w.shape
     if speed == 0.0 and torque == 0.0:
         return 0.0
-    x = min(abs(speed) / limits.machine_step, rows - 1.000001)
-    y = (torque / limits.torque_nm + 1.0) / 2.0 * (columns - 1)
+    x = min(abs(speed) / step, rows - 1.000001)
+    forwards = torque if speed >= 0.0 else -torque
+    y = (forwards / most_nm + 1.0) / 2.0 * (columns - 1)
     y = min(max(y, 0.0), columns - 1.000001)
     i, j = int(x), int(y)
     x, y = x - i, y - j
-    low = limits.loss_w[i, j] + y * (limits.loss_w[i, j + 1] - limits.loss_w[i, j])
-    high = limits.loss_w[i + 1, j] + y * (limits.loss_w[i + 1, j + 1] - limits.loss_w[i + 1, j])
+    low = loss_w[i, j] + y * (loss_w[i, j + 1] - loss_w[i, j])
+    high = loss_w[i + 1, j] + y * (loss_w[i + 1, j + 1] - loss_w[i + 1, j])
     return torque * speed + low + x * (high - low)
+
+
+@compiled(inline="always")
+def electric_w(torque: float, speed: float, limits: Limits) -> float:
+    """Electric power of the machine, by its tabulated loss."""
+    return drawn_w(torque, speed, limits.loss_w, limits.machine_step, limits.torque_nm)
+
+
+@compiled()
+def limit_nm(motors: Motors, m: int, speed: float) -> float:
+    """Highest torque of a machine at a speed, of either sign."""
+    return at(motors.limit_nm[m], motors.step_radps[m], abs(speed))
+
+
+@compiled()
+def electric_of(motors: Motors, m: int, torque: float, speed: float) -> float:
+    """Electric power of a machine, by its tabulated loss."""
+    return drawn_w(torque, speed, motors.loss_w[m], motors.step_radps[m], motors.most_nm[m])
 
 
 @compiled(inline="always")

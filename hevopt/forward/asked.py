@@ -18,15 +18,15 @@ from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward._acting_kernels import LoopTask
-from hevopt.forward.breathing import EngineModel, breathing_of
+from hevopt.forward.breathing import EngineModel
 from hevopt.forward.lines import Line, line_of
+from hevopt.forward.loops import Driving, empty_course
 from hevopt.forward.plans import ForwardPlan, driver_gears, flows_of, signals_of
 from hevopt.forward.run import (
     STEP_S,
     ForwardRun,
     loop_car,
     run_of,
-    start_radps,
     steps_of,
     task_of,
     whole_handling,
@@ -60,12 +60,19 @@ class Asking(NamedTuple):
 
 
 class Decision(NamedTuple):
-    """What a decision has the car do; gears: chosen beside the listed one, which it may choose as well, else 0."""
+    """What a decision has the car do; gears: chosen beside the listed one, which it may choose as well, else 0.
+
+    machines_nm: torque of every machine; engine_radps, engine_nm: of the engine, read where its speed is free
+    closed: whether a clutch of the strategy is
+    """
 
     engine_on: bool
-    machine_nm: float
+    machines_nm: tuple[float, ...]
+    engine_radps: float
+    engine_nm: float
     listed: int
     gears: tuple[tuple[str, int], ...]
+    closed: bool
 
 
 class Decider:
@@ -88,7 +95,12 @@ class Decider:
         table = problem.table
         flows, columns = flows_of(table)
         self._states = flows.states(columns)
-        self._machine_nm = flows[f"{flows.machines[0]}_torque_nm"][:, columns]
+        wanted = [f"{name}_torque_nm" for name in flows.machines]
+        self._machines_nm = np.array([flows[name][:, columns] for name in wanted])
+        self._engine = np.zeros((2, *self._machines_nm.shape[1:]))
+        if flows.car.driveline.free_engine_speed:
+            for n, name in enumerate(("engine_speed_radps", "engine_torque_nm")):
+                self._engine[n] = flows[name][:, columns]
         self._turning = turning_modes(problem)
         on = np.array([state.engine_on for state in self._states])
         self._keeps: list[Flags] = [
@@ -113,8 +125,16 @@ class Decider:
         self._mode, state = int(self.problem.table.mode[control]), self._states[control]
         if state.engine_on != turns:
             self._since_s = at_s
+        machines_nm = tuple(self._machines_nm[:, row, control].tolist())
+        radps, engine_nm = self._engine[:, row, control].tolist()
         return Decision(
-            state.engine_on, float(self._machine_nm[row, control]), state.listed, state.gears
+            state.engine_on,
+            machines_nm,
+            radps,
+            engine_nm,
+            state.listed,
+            state.gears,
+            bool(state.closed),
         )
 
 
@@ -136,7 +156,7 @@ def follow_asked(
     """
     line, handling = line or line_of(car), whole_handling(car, handling)
     decider.asking.check()
-    exact_s, record = steps_of(cycle, step_s, handling)
+    exact_s, record = steps_of(cycle, step_s, handling, len(car.machines))
     wanted_s = np.arange(0.0, cycle.duration_s - 1e-9, decider.asking.interval_s)
     begins = np.append(np.unique(np.round(wanted_s / exact_s).astype(np.int64)), len(record))
     from_s = cycle.time_s[0] + exact_s * begins
@@ -144,23 +164,25 @@ def follow_asked(
     driver = handling.driver._replace(charge_per_s=0.0)
     gears, step, task = _undecided(car, cycle, from_s, planned)
     driven = loop_car(car, line, handling._replace(driver=driver), task.load_w)
-    work, loop = col.work_of(driven.ways), col.begun(driven, task, float(planned.energy_j[0]))
-    breathing = breathing_of(car, engine_model, start_radps(car, line, cycle, task))
-    advance = col.advance if breathing is None else breathing.advance
+    course = empty_course(line, len(from_s) - 1, len(car.machines))
+    driving = Driving(car, line, cycle, driven, task, course, engine_model)
+    loop = driving.begun(float(planned.energy_j[0]))
     way = cache(line.index)
     for d, at_s in enumerate(from_s[:-1].tolist()):
         # A step of the driven car may begin a little before the cycle's.
         k = int(step[d]) if decider.points is not None else min(d, len(gears) - 1)
-        look = col.seen(driven, task, loop, at_s, decider.asking.interval_s, exact_s)
+        look = driving.seen(loop, at_s, decider.asking.interval_s, exact_s)
         command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
         task.way[d] = way(command.listed or int(gears[k]), command.gears)
-        task.engine_on[d], task.machine_nm[d] = command.engine_on, command.machine_nm
+        task.engine_on[d], task.machine_nm[d] = command.engine_on, command.machines_nm[0]
+        if course is not None:
+            course.engine_radps[d], course.engine_nm[d] = command.engine_radps, command.engine_nm
+            course.machine_nm[d], course.closed[d] = command.machines_nm, command.closed
         if d == 0:
-            loop = col.begun(driven, task, loop.energy_j)
-        part = record[begins[d] : begins[d + 1]]
-        loop = advance(driven, task, work, loop, int(begins[d]), part, exact_s)
+            loop = driving.begun(loop.energy_j)
+        loop = driving.advance(loop, int(begins[d]), record[begins[d] : begins[d + 1]], exact_s)
     planned_j = np.asarray(planned.energy_j, dtype=np.float64)
-    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s, breathing)
+    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s, driving)
 
 
 def _undecided(

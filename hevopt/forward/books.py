@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.machine import Machine
 from hevopt.display.facts import Shown
 from hevopt.forward import _breathing_kernels as gas
 from hevopt.forward import _drive_kernels as col
@@ -19,6 +20,8 @@ from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import step_flows
 
+# Share by which the loop keeps idle speed, and knows full load by its table.
+_EDGE = 1e-4
 CAUSES = {motor.LAUNCH: "launch", motor.CHANGE: "change", motor.START: "start", motor.NONE: "other"}
 
 
@@ -95,7 +98,8 @@ def books_of(
     flows |= _burnt(car, flows, None if breath is None else breath[:, gas.FUEL] / step_s)
     if breath is not None:
         flows |= _breath(flows, breath)
-    starter = np.maximum(flows["start_w"], 0.0) / car.machines[0].spin_efficiency
+    spin = max(machine.spin_efficiency for machine in car.machines)
+    starter = np.maximum(flows["start_w"], 0.0) / spin
     flows["starter_electric_w"] = starter
     electric = flows["machine_electric_w"] + flows["auxiliary_power_w"] + starter
     terminal = car.terminal_w(electric)
@@ -109,6 +113,9 @@ def books_of(
     flows |= {name: losses[name] for name in ("battery_chemical_w", "battery_loss_w")}
     off_map = np.isnan(flows["fuel_power_w"]) | np.isnan(flows["machine_loss_w"])
     off_map |= _off_gearbox(car, line, record, turning, step_s)
+    for (name, _), machine in zip(car.driveline.machines, car.machines, strict=True):
+        speed = flows[f"{name}_speed_radps"]
+        off_map |= within_top(machine, speed) != speed
     return Books(flows, _residuals(flows), energy_j, off_map)
 
 
@@ -123,7 +130,7 @@ def _driven(
 ) -> dict[str, Array]:
     """Mechanical powers but for those of the joints."""
     radius, phase = car.vehicle.tyre_radius_m, record[:, col.PHASE].astype(int)
-    torque = record[:, col.ENGINE]
+    torque, given = record[:, col.ENGINE], machines_nm(record)
     turns = phase == motor.TURNING
     clutch = record[:, col.CLUTCH] * (n - units[-1])
     cause = record[:, col.CAUSE].astype(int)
@@ -136,10 +143,8 @@ def _driven(
         "start_w": np.where(phase == motor.STARTING, torque * n, 0.0),
         "stop_w": np.where(turns | (phase == motor.STARTING), 0.0, torque * n),
         "engine_inertia_w": inertia[0],
-        "machine_torque_nm": record[:, col.MACHINE],
-        "machine_speed_radps": units[1],
-        "machine_power_w": record[:, col.MACHINE] * units[1],
-        "machine_inertia_w": inertia[1],
+        "machine_power_w": np.sum(given * units[1:-1], axis=0),
+        "machine_inertia_w": np.sum(inertia[1:-1], axis=0),
         "clutch_torque_nm": record[:, col.CLUTCH],
         "clutch_loss_w": clutch,
         "brake_power_w": record[:, col.BRAKE] * w,
@@ -151,27 +156,43 @@ def _driven(
         * (record[:, col.SPEED] ** 2 - before**2)
         / (2 * step_s),
     }
+    for (machine, _), own_nm, speed_radps in zip(
+        car.driveline.machines, given, units[1:-1], strict=True
+    ):
+        flows[f"{machine}_torque_nm"], flows[f"{machine}_speed_radps"] = own_nm, speed_radps
     for number, name in CAUSES.items():
         flows[f"clutch_{name}_w"] = np.where(cause == number, clutch, 0.0)
     return flows
 
 
+def machines_nm(record: Array) -> Array:
+    """(machine, step) torques of all machines."""
+    torques: Array = np.vstack([record[:, col.MACHINE], record[:, col.COLUMNS :].T])
+    return torques
+
+
 def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[str, Array]:
     """Losses of gearbox and gears: what enters each joint, less what it passes on.
 
-    A torque enters with the speed of its unit, which while a ratio moves is not yet that of its gear.
+    A torque enters with the speed of its unit, which while a ratio moves is not yet that of its gear. No ratio
+    moves where the engine has a speed of its own; a joint may turn by both speeds there.
     """
     ways, way = line.ways, record[:, col.WAY].astype(np.int64)
     variant = record[:, col.VARIANT].astype(np.int64)
     applied = _applied(line, record, turning, step_s)
     applied[-1] -= record[:, col.LOST]
     power = applied * turning.mean(turning.by_wheel)
+    wheel, side = turning.mean(turning.wheel), turning.mean(turning.side)
     settled = ways.wheel[way]
     per_wheel = np.divide(1.0, settled, out=np.zeros_like(settled), where=settled != 0)
     result = {"gearbox_loss_w": np.zeros(len(way)), "gear_loss_w": np.zeros(len(way))}
     for j, name in enumerate(line.losses):
-        share = ways.load[way, variant, j] * ways.sense[way, j, :1] * per_wheel
-        entering, eta = np.einsum("nu,un->n", share, power), ways.efficiency[way, j]
+        load, sense, eta = ways.load[way, variant, j], ways.sense[way, j], ways.efficiency[way, j]
+        if line.free is None:
+            entering = np.einsum("nu,un->n", load * sense[:, :1] * per_wheel, power)
+        else:
+            through = np.einsum("nu,un->n", load, applied)
+            entering = through * (sense[:, 0] * wheel + sense[:, 1] * side)
         backward = (variant >> j & 1).astype(bool)
         result[f"{name}_loss_w"] += entering * np.where(backward, 1 - 1 / eta, 1 - eta)
     result["gearbox_loss_w"] += record[:, col.LOST] * turning.mean(turning.by_wheel[-1])
@@ -180,7 +201,7 @@ def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[
 
 def _applied(line: Line, record: Array, turning: Turning, step_s: float) -> Array:
     """(unit, step) torques on the units, less what their own inertia takes."""
-    applied = np.stack([record[:, col.ENGINE], record[:, col.MACHINE], record[:, col.CLUTCH]])
+    applied = np.vstack([record[:, col.ENGINE], machines_nm(record), record[:, col.CLUTCH]])
     inertia = line.ways.inertia_kgm2[:, None]
     less: Array = applied - inertia * np.diff(turning.units, axis=1) / step_s
     return less
@@ -218,13 +239,21 @@ def _burnt(
     """Fuel, NOx and the machine's electric power, by the car's own components; own_kgps: fuel not by the map."""
     torque, speed = flows["engine_torque_nm"], flows["engine_speed_radps"]
     turns = (speed > 0) & (flows["start_w"] == 0) & (flows["stop_w"] == 0)
+    # At idle speed and at full load, where a measured map may end.
+    idle = car.engine.idle_radps
+    speed = np.where((speed < idle) & (speed > idle * (1 - _EDGE)), idle, speed)
+    most = car.engine.covered_nm(np.where(turns, speed, idle))
+    torque = np.where((torque > most) & (torque < most * (1 + _EDGE)), most, torque)
     fuel = np.where(turns, car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)), 0.0)
     by_map = {} if own_kgps is None else {"map_fuel_kgps": fuel}
     fuel = fuel if own_kgps is None else own_kgps
     nox = np.where(fuel == 0, 0.0, car.engine.nox_kgps(torque, np.where(turns, speed, 1.0)))
     power = fuel * car.engine.heating_value_jpkg
-    machine = np.abs(flows["machine_speed_radps"])
-    loss = car.machines[0].loss_w(flows["machine_torque_nm"], machine)
+    loss = np.zeros(len(torque))
+    for (name, _), machine in zip(car.driveline.machines, car.machines, strict=True):
+        loss = loss + machine.loss_w(
+            flows[f"{name}_torque_nm"], within_top(machine, flows[f"{name}_speed_radps"])
+        )
     return by_map | {
         "fuel_kgps": fuel,
         "nox_kgps": nox,
@@ -233,6 +262,11 @@ def _burnt(
         "machine_loss_w": loss,
         "machine_electric_w": flows["machine_power_w"] + loss,
     }
+
+
+def within_top(machine: Machine, speed_radps: Array) -> Array:
+    """A machine's speeds, its highest where they are beyond that."""
+    return np.clip(speed_radps, -machine.speed_max_radps, machine.speed_max_radps)
 
 
 def _residuals(f: Mapping[str, Array]) -> dict[str, Array]:

@@ -103,6 +103,16 @@ def check_engine_model(engine_model: str) -> None:
         raise DataError(f"engine model {engine_model!r}; allowed: {', '.join(ENGINE_MODELS)}")
 
 
+def check_steady(car: Architecture, engine_model: str) -> None:
+    """DataError for a model of the engine that is none, or that this car is not driven with."""
+    check_engine_model(engine_model)
+    if engine_model == "mean_value" and car.driveline.free_engine_speed:
+        raise DataError(
+            f"{car.name}: an engine that has a speed of its own is driven by its map only; leave --engine-model "
+            "mean_value out"
+        )
+
+
 def breathing_of(
     car: Architecture, engine_model: str, side_radps: float, torque_nm: float = 0.0
 ) -> Breathing | None:

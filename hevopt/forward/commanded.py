@@ -17,6 +17,7 @@ from hevopt.forward._acting_kernels import LoopTask
 from hevopt.forward._drive_kernels import Loop
 from hevopt.forward._pedal_kernels import PedalState
 from hevopt.forward.books import Books, books_of
+from hevopt.forward.drivable import check_geared
 from hevopt.forward.lines import line_of
 from hevopt.forward.run import STEP_S, check_charge, check_step, loop_car, whole_handling
 from hevopt.problem.arrays import Array
@@ -95,6 +96,7 @@ class CommandedCar:
         self.car, self.step_s = car, float(step_s)
         whole = whole_handling(car, handling)
         check_step(step_s, whole)
+        check_geared(car, "a unit under commands")
         self.line = line_of(car)
         driver = whole.driver._replace(**_NO_GAINS)
         self._driven = loop_car(car, self.line, whole._replace(driver=driver))

@@ -4,7 +4,7 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.machine import Machine
-from hevopt.forward._limits_kernels import Limits
+from hevopt.forward._limits_kernels import Limits, Motors
 from hevopt.problem.arrays import Array
 from hevopt.problem.battery import power_limits_w
 
@@ -22,7 +22,7 @@ _FASTEST_RADPS, _STRONGEST_NM = 2e4, 1e4
 
 
 def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> Limits:
-    """The limits of a car with one machine; loads_w: least and greatest electric load, None for the car's own."""
+    """The limits of a car and its first machine; loads_w: least and greatest electric load, None for its own."""
     own_w = car.vehicle.auxiliary_power_w
     least_w, most_w = loads_w or (own_w, own_w)
     engine, machine = car.engine, car.machines[0]
@@ -30,6 +30,10 @@ def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> 
     least = np.nan_to_num(engine.drag_nm(speed))
     full = engine.covered_nm(speed)
     full = np.where(np.isnan(full) | (speed > engine.speed_max_radps), np.maximum(least, 0.0), full)
+    if car.driveline.free_engine_speed:
+        # Kept at idle speed by a machine it gives what it has there, a rounding below it too.
+        at_idle = float(engine.covered_nm(np.array([engine.idle_radps]))[0])
+        full = np.where(speed < engine.idle_radps, at_idle, full)
     load, rows = np.zeros((0, len(speed))), _LOADS if most_w > least_w else 1
     if car.driveline.follows_load:
         turning = np.maximum(speed, 0.3 * engine.idle_radps)
@@ -37,20 +41,42 @@ def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> 
             machine.generating_nm(w, turning) for w in np.linspace(least_w, most_w, rows).tolist()
         )
         load = np.nan_to_num(np.array(list(given)))
-    top = min(machine.speed_max_radps, _FASTEST_RADPS)
-    machine_speed = np.linspace(0.0, _BEYOND * top, _MACHINE_POINTS)
-    most = float(min(machine.torque_max_nm, _STRONGEST_NM))
-    torque = np.linspace(-most, most, _TORQUES)
-    loss = np.nan_to_num(machine.loss_w(torque[None, :], machine_speed[:, None]))
+    machine_speed, most, loss = _tabulated(machine)
     low, high = _allowed(car, machine, machine_speed, (least_w, most_w))
     return Limits(
         _ENGINE_STEP_RADPS, full, least, load, float(least_w), float(most_w - least_w) / max(rows - 1, 1),
         float(machine_speed[1]), low, high, loss, most, engine.idle_radps, engine.speed_max_radps, own_w,
-        machine.spin_efficiency, _braking_share(car), _BRAKING_MPS, _BRAKING_RATE,
+        max(each.spin_efficiency for each in car.machines), _braking_share(car), _BRAKING_MPS, _BRAKING_RATE,
         *_converting(car),
         bool(car.functions & {"e_boost", "nox_cut", "power_management"}),
         "regenerative_braking" in car.functions,
     )  # fmt: skip
+
+
+def motors_of(car: Architecture) -> Motors:
+    """The limits of every machine of a car, and of its battery."""
+    tables = [_tabulated(machine) for machine in car.machines]
+    speeds, most, losses = (list(parts) for parts in zip(*tables, strict=True))
+    limits = [
+        np.where(speed <= machine.speed_max_radps, machine.limit_nm(speed), 0.0)
+        for machine, speed in zip(car.machines, speeds, strict=True)
+    ]
+    least_w, most_w = power_limits_w(car.battery)
+    top = np.array([machine.speed_max_radps for machine in car.machines])
+    return Motors(
+        np.array([speed[1] for speed in speeds]), np.minimum(np.array(limits), _STRONGEST_NM), np.array(losses),
+        np.array(most), top, float(least_w), float(most_w),
+    )  # fmt: skip
+
+
+def _tabulated(machine: Machine) -> tuple[Array, float, Array]:
+    """Speeds, highest torque, and (speed, torque) loss of a machine up to that torque of either sign."""
+    top = min(machine.speed_max_radps, _FASTEST_RADPS)
+    speed = np.linspace(0.0, _BEYOND * top, _MACHINE_POINTS)
+    known = np.where(speed <= machine.speed_max_radps, machine.limit_nm(speed), 0.0)
+    most = min(float(known.max()), _STRONGEST_NM)
+    torque = np.linspace(-most, most, _TORQUES)
+    return speed, most, np.nan_to_num(machine.loss_w(torque[None, :], speed[:, None]))
 
 
 def _converting(car: Architecture) -> tuple[Array, Array]:

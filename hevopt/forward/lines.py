@@ -3,11 +3,13 @@
 The ways are those in which the driver's clutch slips, so that the engine's side turns by itself: the wheels and
 that side are free, every joint but the clutch gives a speed row, and the torques on the units reach wheels and side
 by the balance of the other shafts. A closed clutch is then a torque, an open one none. A car without an engine has
-that side as well, with nothing on it: it rests.
+that side as well, with nothing on it: it rests. Where the engine has a speed of its own there is one way: a lock-up
+clutch slips.
 """
 
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,17 +17,27 @@ from hevopt.car.architecture import Architecture
 from hevopt.car.balance import speeds_of
 from hevopt.car.driveline import ENGINE, Driveline, Phase, State
 from hevopt.car.linear import Row, Terms, solved
-from hevopt.car.parts import WHEEL, Clutch, Gear, Gearbox, Joint
+from hevopt.car.parts import WHEEL, Clutch, Joint
 from hevopt.car.ways import Way, way
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.forward._rows_kernels import NO_LOSS, Lost, Ways
+from hevopt.forward.drivable import check_drivable, limited_gears, mapped_boxes
 
 _NET = "net torque on "
 _OUTPUT = "clutch's output"
 _NO_ENGINE = "engine's side of a car that has none"
 _ONLY_GEAR = 1
+# Below it two machines cannot give torques at wheels and engine's side apart from each other.
+_DEPENDENT = 1e-6
 Key = tuple[int, tuple[tuple[str, int], ...], frozenset[str]]
+
+
+class Free(NamedTuple):
+    """Of an engine that has a speed of its own: numbers of the machine that keeps it and of the one that drives."""
+
+    governor: int
+    driving: int
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -35,6 +47,7 @@ class Line(Shown):
     keys: of each way the gear listed, the gears chosen beside it, and what its own speed has opened
     losses: of each lossy joint, what its loss is called
     fast_way: (way,) the way with couplings opened that turn too fast; fast_radps: (way,) speed of the wheels for it
+    free: of an engine that has a speed of its own, else None
     """
 
     ways: Ways
@@ -42,6 +55,7 @@ class Line(Shown):
     losses: tuple[str, ...]
     fast_way: np.ndarray
     fast_radps: np.ndarray
+    free: Free | None = None
 
     def index(self, gear: int, gears: tuple[tuple[str, int], ...]) -> int:
         """The way of a listed gear and the gears chosen beside it; of the nearest gear where these exclude it."""
@@ -63,7 +77,7 @@ class Line(Shown):
 
 def line_of(car: Architecture) -> Line:
     """The ways of a car; DataError where its driveline asks for more than a driver and one machine decide."""
-    _check(car)
+    check_drivable(car)
     line = car.driveline
     keys = [key for key in _keys(line)]
     joints = {key: _way(line, key).joints(key[0]) for key in keys}
@@ -81,55 +95,40 @@ def line_of(car: Architecture) -> Line:
         _fill(ways, n, _way(line, key), joints[key], tuple(lossy), (ENGINE, *machines), key[0])
     fast_way, fast = np.arange(count), np.full(count, np.inf)
     for n, (gear, gears, opened) in enumerate(keys):
-        for part in _limited(line):
+        for part in limited_gears(line):
             if not opened:
                 fast_way[n] = keys.index((gear, gears, frozenset([part.name])))
                 per_wheel = speeds_of(_way(line, keys[n]))[part.first][WHEEL]
                 fast[n] = part.speed_max_radps / abs(float(np.max(np.abs(per_wheel))))
-    return Line(ways, tuple(keys), tuple(lossy.values()), fast_way, fast)
+    free = _free(car, ways) if line.free_engine_speed else None
+    return Line(ways, tuple(keys), tuple(lossy.values()), fast_way, fast, free)
 
 
-def _check(car: Architecture) -> None:
-    line, lacking = car.driveline, ""
-    odd = [part.name for part in line.parts if not isinstance(part, Gear | Gearbox | Clutch)]
-    odd += [p.name for p in line.parts if isinstance(p, Clutch) and p.operation != "driver"]
-    if line.converter is not None:
-        lacking = f"{line.converter.name} slips, which the plant does not know"
-    elif line.engine is not None and not (line.boxes and line.driver_clutches):
-        lacking = "its engine is behind no driver's clutch and gears"
-    elif line.free_engine_speed:
-        lacking = "its engine's speed is free"
-    elif odd:
-        lacking = f"the strategy moves {', '.join(odd)}"
-    elif len(line.machines) != 1:
-        lacking = f"it has {len(line.machines)} machines"
-    elif (mapped := _mapped(line)) and (
-        len(line.boxes) > 1
-        or mapped[0].first not in {s for c in line.driver_clutches for s in c.shafts}
-    ):
-        lacking = "a loss_map is of more than one gearbox, or of one that is not behind the driver's clutch"
-    elif len(_limited(line)) > 1 or any(box.choice == "free" for box in line.boxes):
-        lacking = "more than one part follows a choice of its own"
-    if lacking:
+def _free(car: Architecture, ways: Ways) -> Free:
+    """Which machine keeps the engine's speed and which drives: by their shares at engine's side and wheels."""
+    at_wheels = ways.wheel[0] * ways.wheel_yield[0, 0]
+    at_side = ways.side[0] * ways.side_yield[0, 0]
+    pairs = permutations(range(1, len(car.machines) + 1), 2)
+    apart = {
+        pair: at_side[pair[0]] * at_wheels[pair[1]] - at_wheels[pair[0]] * at_side[pair[1]]
+        for pair in pairs
+    }
+    both = max(
+        apart, key=lambda pair: (round(abs(apart[pair]), 9), abs(at_side[pair[0]]), -pair[0])
+    )
+    if abs(apart[both]) < _DEPENDENT:
         raise DataError(
-            f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "
-            "machine, and no engine or one behind a driver's clutch and gears, can; `hevopt run` solves it backward"
+            f"{car.name}: cannot be driven forward, as no two machines keep the engine's speed and drive each by "
+            "itself; `hevopt run` solves it backward"
         )
-
-
-def _mapped(line: Driveline) -> list[Gearbox]:
-    return [box for box in line.boxes if box.loss is not None]
-
-
-def _limited(line: Driveline) -> list[Gear]:
-    return [p for p in line.parts if isinstance(p, Gear) and np.isfinite(p.speed_max_radps)]
+    return Free(both[0] - 1, both[1] - 1)
 
 
 def _keys(line: Driveline) -> list[Key]:
     """Every listed gear with every choice beside it that goes with it, couplings closed, then open."""
     chosen = [box for box in line.boxes if box.choice == "preselected"]
     listed = sorted(gear for box in line.boxes for gear in box.gears) or [_ONLY_GEAR]
-    opened = [frozenset[str](), *(frozenset([part.name]) for part in _limited(line))]
+    opened = [frozenset[str](), *(frozenset([part.name]) for part in limited_gears(line))]
     keys: list[Key] = []
     for open_, gear in product(opened, listed):
         for gears in product(*([(box.name, g) for g in box.gears] for box in chosen)):
@@ -140,6 +139,12 @@ def _keys(line: Driveline) -> list[Key]:
 
 def _way(line: Driveline, key: Key) -> Way:
     gear, gears, opened = key
+    if line.free_engine_speed:
+        # The strategy's clutch slips as a driver's does, for what it passes is found by the step.
+        parts = tuple(
+            replace(p, operation="driver") if isinstance(p, Clutch) else p for p in line.parts
+        )
+        return way(replace(line, parts=parts), State(True), Phase(False, "slipping"))
     if line.engine is None:
         return way(line, State(False, gears), Phase(False, "open", None, opened))
     box = next(box.name for box in line.boxes if gear in box.gears)
@@ -156,7 +161,7 @@ def _lossy(joints: object) -> dict[str, str]:
 
 def _lost(line: Driveline, lossy: dict[str, str], keys: list[Key]) -> Lost:
     """The map of a gearbox that has one, every gear's as wide as the widest, going on as its own ends."""
-    boxes = _mapped(line)
+    boxes = mapped_boxes(line)
     if not boxes:
         return NO_LOSS
     loss = boxes[0].loss

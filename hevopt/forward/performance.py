@@ -15,6 +15,7 @@ from hevopt.forward._acting_kernels import LoopCar
 from hevopt.forward._contact_kernels import resistance
 from hevopt.forward._pull_kernels import Foot
 from hevopt.forward.breathing import Breathing, EngineModel, check_engine_model
+from hevopt.forward.drivable import check_geared
 from hevopt.forward.forces import (
     LAUNCH_RPM,
     Curves,
@@ -121,6 +122,7 @@ def performance(
     DataError for a car whose driveline cannot be driven forward, and for boost that its functions lack.
     """
     handling = handling or car.handling
+    check_geared(car, "full pedal")
     _check(car, boosts or fills, added_kg, boost_lag_s, handling, engine_model)
     loaded, line = car.of_mass(car.vehicle.mass_kg + added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)

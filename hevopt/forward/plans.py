@@ -8,6 +8,7 @@ import numpy as np
 from hevopt.car.driveline import State
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
+from hevopt.forward._free_kernels import FreeCourse
 from hevopt.forward.lines import Line
 from hevopt.powertrain.flows import PowerFlows
 from hevopt.problem.arrays import Array, Flags, Indices
@@ -23,6 +24,7 @@ class ForwardPlan(Shown):
     way: (time,) index of a Line; engine_on: (time,)
     open_while: (time,) the clutch is open: 0 never, 1 while the car is braked, 2 always
     machine_nm: (time,) set-point of the machine while the engine drives; energy_j: (time + 1,) stored energy
+    course: of an engine that has a speed of its own, else None
     """
 
     way: Indices
@@ -30,6 +32,7 @@ class ForwardPlan(Shown):
     open_while: Indices
     machine_nm: Array
     energy_j: Array
+    course: FreeCourse | None = None
 
 
 def replay_of(trajectory: Trajectory, line: Line) -> ForwardPlan:
@@ -40,14 +43,27 @@ def replay_of(trajectory: Trajectory, line: Line) -> ForwardPlan:
     states = flows.states(columns[trajectory.control])
     in_gear, open_while = driver_gears(signals, states)
     way = [line.index(int(g), state.gears) for g, state in zip(in_gear, states, strict=True)]
-    machine = trajectory.flows[f"{flows.machines[0]}_torque_nm"]
+    machine, course = trajectory.flows[f"{flows.machines[0]}_torque_nm"], None
+    if line.free is not None:
+        found = trajectory.flows
+        course = FreeCourse(
+            _own(found["engine_speed_radps"]),
+            _own(found["engine_torque_nm"]),
+            _own(np.stack([found[f"{name}_torque_nm"] for name in flows.machines], axis=1)),
+            np.array([bool(state.closed) for state in states]),
+        )
     return ForwardPlan(
         np.array(way, dtype=np.int64),
         np.array([state.engine_on for state in states]),
         open_while,
-        np.ascontiguousarray(machine, dtype=np.float64),
-        np.ascontiguousarray(trajectory.energy_j, dtype=np.float64),
+        _own(machine),
+        _own(trajectory.energy_j),
+        course,
     )
+
+
+def _own(values: Array) -> Array:
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def flows_of(table: ControlTable) -> tuple[PowerFlows, Indices]:

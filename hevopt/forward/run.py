@@ -16,9 +16,10 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._contact_kernels import Body
 from hevopt.forward.books import Books, books_of
-from hevopt.forward.breathing import Breathing, EngineModel, breathing_of
+from hevopt.forward.breathing import EngineModel
 from hevopt.forward.limits import limits_of
 from hevopt.forward.lines import Line, line_of
+from hevopt.forward.loops import Driving
 from hevopt.forward.plans import ForwardPlan
 from hevopt.forward.quality import DriveQuality, drive_quality
 from hevopt.forward.stability import check_gains
@@ -139,14 +140,12 @@ def follow(
     or a figure out of range, a driveline that cannot be driven forward, and a battery that empties on the way.
     """
     line, handling = line or line_of(car), whole_handling(car, handling)
-    exact_s, record = steps_of(cycle, step_s, handling)
+    exact_s, record = steps_of(cycle, step_s, handling, len(car.machines))
     task = task_of(car, cycle, plan, cycle.time_s)
     driven = loop_car(car, line, handling, task.load_w)
-    breathing = breathing_of(car, engine_model, start_radps(car, line, cycle, task))
-    loop = col.begun(driven, task, float(plan.energy_j[0]))
-    advance = col.advance if breathing is None else breathing.advance
-    advance(driven, task, col.work_of(driven.ways), loop, 0, record, exact_s)
-    return run_of(car, cycle, task, plan.energy_j, line, handling, record, exact_s, breathing)
+    driving = Driving(car, line, cycle, driven, task, plan.course, engine_model)
+    driving.advance(driving.begun(float(plan.energy_j[0])), 0, record, exact_s)
+    return run_of(car, cycle, task, plan.energy_j, line, handling, record, exact_s, driving)
 
 
 def whole_handling(car: Architecture, handling: Handling | None) -> Handling:
@@ -155,11 +154,13 @@ def whole_handling(car: Architecture, handling: Handling | None) -> Handling:
     return handling._replace(shifting=handling.shifting or shifting_of(car))
 
 
-def steps_of(cycle: Cycle, step_s: float, handling: Handling) -> tuple[float, Array]:
+def steps_of(
+    cycle: Cycle, step_s: float, handling: Handling, machines: int = 1
+) -> tuple[float, Array]:
     """Length of the steps, so that they fill the cycle, and the empty record; DataError as `follow` says."""
     _check(cycle, step_s, handling)
     count = int(np.ceil(cycle.duration_s / step_s - 1e-9))
-    return cycle.duration_s / count, np.zeros((count, col.COLUMNS))
+    return cycle.duration_s / count, np.zeros((count, col.COLUMNS + machines - 1))
 
 
 def loop_car(
@@ -210,20 +211,14 @@ def _loads_w(car: Architecture, cycle: Cycle) -> Array:
     return np.repeat(np.array(own, dtype=np.float64), len(cycle.time_s) - 1, axis=1)
 
 
-def start_radps(car: Architecture, line: Line, cycle: Cycle, task: LoopTask) -> float:
-    """Speed at which the engine turns, or would if it did, as the cycle begins."""
-    wheel_radps = float(cycle.speed_mps[0]) / car.vehicle.tyre_radius_m
-    return float(max(car.engine.idle_radps, line.ways.wheel[task.way[0], -1] * wheel_radps))
-
-
 def run_of(
     car: Architecture, cycle: Cycle, task: LoopTask, planned_j: Array, line: Line, handling: Handling,
-    record: Array, step_s: float, breathing: Breathing | None = None,
+    record: Array, step_s: float, driving: Driving,
 ) -> ForwardRun:  # fmt: skip
     """What a loop has recorded, judged; planned_j: (time + 1,) stored energy that was planned over the cycle."""
     start_mps, on = float(cycle.speed_mps[0]), bool(task.engine_on[0])
-    side = start_radps(car, line, cycle, task) if on else 0.0
-    breath = None if breathing is None else breathing.breath
+    side = driving.start_radps if on else 0.0
+    breath = None if driving.breathing is None else driving.breathing.breath
     time_s = cycle.time_s[0] + step_s * np.arange(len(record) + 1)
     at = np.searchsorted(cycle.time_s, time_s[:-1] + 1e-9, "right") - 1
     rests = record[:, col.PHASE] == motor.REST

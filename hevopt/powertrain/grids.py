@@ -177,7 +177,7 @@ def _inner(
     idle, crosses = battery_idle(here, given, name, np.broadcast_to(done.battery_w, grid.shape))
     given = {**outer, name: idle}
     yield Gridded(here, given, evaluated(here, state, given, step_s), ~crosses)
-    if way.slack not in (ENGINE, None):
+    if way.slack not in (ENGINE, None) and (here.shafts.wheel_nm <= 0).any():
         few = np.nan_to_num(np.column_stack([_even(low, high, _LEAST_COUNT), *special]))
         part, given = _braked(here, {**outer, name: few})
         done = evaluated(part, state, given, step_s)

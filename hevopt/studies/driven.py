@@ -13,7 +13,7 @@ from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.asked import Asking, follow_asked
-from hevopt.forward.breathing import EngineModel, check_engine_model
+from hevopt.forward.breathing import EngineModel, check_steady
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of
 from hevopt.forward.run import STEP_S, ForwardRun, follow
@@ -116,7 +116,7 @@ def drive(
     check_horizon(settings.horizon_s, [strategy])
     strategy_named(strategy)
     asking.check()
-    check_engine_model(engine_model)
+    check_steady(car, engine_model)
     line_of(car)
     case = prepare(car, cycle, settings)
     row, _, trajectory = run_case(case, strategy, settings.horizon_s)

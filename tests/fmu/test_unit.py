@@ -226,7 +226,7 @@ def test_what_cannot_be_a_unit_is_refused_in_one_sentence(tmp_path):
     out = tmp_path / "car.fmu"
     with pytest.raises(DataError, match=r"must end in \.fmu"):
         export_fmu(load_architecture("A"), tmp_path / "car.zip")
-    with pytest.raises(DataError, match="cannot be driven forward yet"):
+    with pytest.raises(DataError, match="under commands is for an engine behind"):
         export_fmu(load_architecture("prius_1998"), out)
     with pytest.raises(DataError, match=r"changed after .* was read"):
         export_fmu(load_architecture("A").of_mass(1500.0), out)

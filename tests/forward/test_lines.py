@@ -78,5 +78,5 @@ def test_a_driveline_with_choices_of_its_own_is_refused_in_one_sentence():
     ):
         line_of(replace(car, driveline=replace(car.driveline, parts=parts)))
     free = replace(car.driveline, free_engine_speed=True)
-    with pytest.raises(DataError, match="its engine's speed is free"):
+    with pytest.raises(DataError, match="gearbox beside the engine's own speed"):
         line_of(replace(car, driveline=free))

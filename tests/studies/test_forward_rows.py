@@ -20,7 +20,7 @@ def hop():
 
 @pytest.fixture(scope="module")
 def comparison(hop):
-    return compare(hop, ["C2", "series_1500"], ["dp", "conventional"], forward=True)
+    return compare(hop, ["C2", "p0_p4_diesel"], ["dp", "conventional"], forward=True)
 
 
 def test_every_row_has_its_forward_figures_or_says_why_it_was_not_driven(comparison):
@@ -30,9 +30,9 @@ def test_every_row_has_its_forward_figures_or_says_why_it_was_not_driven(compari
     assert dp.violations == 0 and dp.rmsse_kmh < 0.5
     assert abs(dp.change_percent) < 10
     for name in ("dp", "conventional"):
-        left_out = comparison.forward["series_1500", name]
+        left_out = comparison.forward["p0_p4_diesel", name]
         assert left_out.fuel_l_per_100km is None and left_out.status.startswith("not driven: ")
-        assert "series_1500" in left_out.status
+        assert "p0_p4_diesel" in left_out.status
 
 
 def test_the_plan_of_a_strategy_that_is_brought_along_is_replayed(hop):
@@ -54,7 +54,7 @@ def test_tables_json_and_frames_have_the_forward_columns(comparison):
     heads = [str(column.header) for column in table.columns]
     assert {"driven\nl/100km", "against\n%", "RMSSE\nkm/h", "missed\n"} <= set(heads)
     assert needed_width(table) <= 100
-    assert "series_1500 dp, driven: not driven: " in terminal_tables.comparison_notes(comparison)
+    assert "p0_p4_diesel dp, driven: not driven: " in terminal_tables.comparison_notes(comparison)
 
 
 def test_without_being_asked_for_nothing_is_driven(comparison):

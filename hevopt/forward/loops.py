@@ -1,0 +1,89 @@
+"""The compiled loop that a car is driven by: with clutch and gears, or of an engine that has a speed of its own."""
+
+from typing import Any
+
+import numpy as np
+
+from hevopt.car.architecture import Architecture
+from hevopt.driving.cycle import Cycle
+from hevopt.forward import _drive_kernels as geared
+from hevopt.forward import _free_loop_kernels as free
+from hevopt.forward._acting_kernels import LoopCar, LoopTask
+from hevopt.forward._free_kernels import FreeCar, FreeCourse
+from hevopt.forward.breathing import Breathing, EngineModel, breathing_of, check_steady
+from hevopt.forward.limits import motors_of
+from hevopt.forward.lines import Line
+from hevopt.problem.arrays import Array
+
+
+class Driving:
+    """One car on one task; what lies between two steps is a `Loop` or a `FreeLoop`.
+
+    start_radps: speed at which the engine turns, or would if it did, as the cycle begins
+    course: None but of an engine that has a speed of its own
+    DataError for an engine model that is none, or that the car is not driven with.
+    """
+
+    def __init__(
+        self,
+        car: Architecture,
+        line: Line,
+        cycle: Cycle,
+        driven: LoopCar,
+        task: LoopTask,
+        course: FreeCourse | None,
+        engine_model: EngineModel,
+    ) -> None:
+        check_steady(car, engine_model)
+        self._driven, self._task, self.course = driven, task, course
+        self._work = geared.work_of(driven.ways)
+        idle = car.engine.idle_radps
+        turns = line.ways.wheel[task.way[0], -1] * float(cycle.speed_mps[0])
+        self._start = float(max(idle, turns / car.vehicle.tyre_radius_m))
+        self.breathing: Breathing | None = None
+        self._free: FreeCar | None = None
+        if line.free is None:
+            self.breathing = breathing_of(car, engine_model, self._start)
+        else:
+            lowest = float(car.engine.law.lowest_nm)
+            self._free = FreeCar(
+                driven, motors_of(car), line.free.governor, line.free.driving, lowest
+            )
+
+    @property
+    def start_radps(self) -> float:
+        """Speed at which the engine turns, or would if it did, as the cycle begins."""
+        if self.course is None:
+            return self._start
+        return float(max(self._driven.limits.idle_radps, self.course.engine_radps[0]))
+
+    def begun(self, start_j: float) -> Any:
+        """The loop before its first step, with a stored energy."""
+        if self._free is not None and self.course is not None:
+            return free.begun(self._free, self._task, self.course, start_j)
+        return geared.begun(self._driven, self._task, start_j)
+
+    def seen(self, loop: Any, at_s: float, for_s: float, step_s: float) -> geared.Look:
+        """What a decision sees that holds for a time."""
+        return geared.seen(self._driven, self._task, loop, at_s, for_s, step_s)
+
+    def advance(self, loop: Any, first: int, record: Array, step_s: float) -> Any:
+        """The loop after some more steps, `first` of them being the first; record: filled."""
+        if self._free is not None and self.course is not None:
+            return free.advance(
+                self._free, self._task, self.course, self._work, loop, first, record, step_s
+            )
+        advance = geared.advance if self.breathing is None else self.breathing.advance
+        return advance(self._driven, self._task, self._work, loop, first, record, step_s)
+
+
+def empty_course(line: Line, decisions: int, machines: int) -> FreeCourse | None:
+    """A course to be filled decision by decision; None without an engine that has a speed of its own."""
+    if line.free is None:
+        return None
+    return FreeCourse(
+        np.zeros(decisions),
+        np.zeros(decisions),
+        np.zeros((decisions, machines)),
+        np.zeros(decisions, dtype=bool),
+    )
