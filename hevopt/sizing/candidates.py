@@ -18,7 +18,7 @@ from hevopt.sizing.study_file import SizeStudy
 from hevopt.sweeps.plan.designs import Design
 from hevopt.sweeps.plan.jobs import BOUND, Job, Planned, jobs_of
 from hevopt.sweeps.plan.parameters import Scalar
-from hevopt.sweeps.plan.prune import follows
+from hevopt.sweeps.plan.prune import Pruned, follows
 from hevopt.sweeps.store.store import Store
 
 # Designs solved between two looks at what is best: few, so that bounds spare many.
@@ -74,6 +74,7 @@ class Candidates:
         self.found: list[Candidate] = []
         self._known: dict[str, Candidate] = {}
         self._planned: list[Planned] = []
+        self._pruned: list[Pruned] = []
 
     def judged(self, wanted: Sequence[dict[str, Scalar]]) -> list[Candidate]:
         """The candidates of some values of the parameters, in their order."""
@@ -124,7 +125,13 @@ class Candidates:
         for _, cases in found:
             self._planned += cases
             plan[cases[0].design] += cases
-        designs = ((one.design.number, one.design.values) for one in self.found)
+        # A store's designs have cases; what misses a requirement has none.
+        planned = {case.design for case in self._planned}
+        designs = (
+            (one.design.number, one.design.values)
+            for one in self.found
+            if one.design.number in planned
+        )
         self.store.begin(self.meta, designs, self._planned)
         every = [case for cases in plan.values() for case in cases]
         self.run(jobs, [case.key for case in every if case.strategy == BOUND])
@@ -136,14 +143,17 @@ class Candidates:
         )
         while waiting:
             for one in waiting:
-                if self._beaten(one):
+                better = self._better(one)
+                if better is not None:
                     one.fate = Fate.DISCARDED
+                    self._discard(one, better)
             waiting = [one for one in waiting if one.fate is Fate.SOLVED]
             now, waiting = waiting[:_SOLVED_AT_ONCE], waiting[_SOLVED_AT_ONCE:]
             keys = [c.key for one in now for c in plan[one.design.number] if c.strategy != BOUND]
             self.run(jobs, keys)
             for one in now:
                 self._result(one, plan[one.design.number])
+        self.store.prune(self._pruned)
 
     def _bound(self, one: Candidate, cases: Sequence[Planned]) -> None:
         figures = self._figures(one, [c for c in cases if c.strategy == BOUND], "bound_l_per_100km")
@@ -179,14 +189,27 @@ class Candidates:
         assert one.car is not None  # a design that is solved is a car
         return tuple(objective.value(one.car, mean) for objective in self.study.objectives)
 
-    def _beaten(self, one: Candidate) -> bool:
-        """Whether its bounds lie above what some solved design reaches, in every objective."""
+    def _better(self, one: Candidate) -> Candidate | None:
+        """A solved design that reaches, in every objective, no more than the bounds of this one."""
         if one.bounds is None:
-            return False
+            return None
         bounds = one.bounds
-        return any(
-            all(bound >= value for bound, value in zip(bounds, other.values or (), strict=True))
-            and bounds != other.values
-            for other in self.solved
-            if other is not one
+        return next(
+            (
+                other
+                for other in self.solved
+                if other is not one
+                and all(b >= value for b, value in zip(bounds, other.values or (), strict=True))
+                and bounds != other.values
+            ),
+            None,
+        )
+
+    def _discard(self, one: Candidate, better: Candidate) -> None:
+        """Keep by what a design was discarded, where that is its fuel, so that nobody waits for its results."""
+        if [dict(objective.weights) for objective in self.study.objectives] != [{"fuel": 1.0}]:
+            return
+        assert one.bounds is not None and better.values is not None  # as both were compared
+        self._pruned.append(
+            Pruned(one.design.number, one.bounds[0], better.design.number, better.values[0])
         )

@@ -28,6 +28,12 @@ FIRST = (
     "[...document.querySelectorAll('#comparison tbody tr')].map(row => row.cells[{}].dataset.value)"
 )
 
+CUT = """id => {
+  const box = document.getElementById(id).getBoundingClientRect();
+  return [...document.querySelectorAll(`#${id} text`)].map(text => [text.textContent, text.getBoundingClientRect()])
+    .filter(([text, at]) => text && (at.left < box.left - 0.5 || at.right > box.right + 0.5)).map(([text]) => text);
+}"""
+
 
 def test_opening_and_using_it_logs_nothing_and_asks_for_nothing(nedc, opened):
     found = opened(nedc.path)
@@ -237,6 +243,12 @@ def test_what_was_not_asked_for_is_said_and_a_wide_figure_says_to_scroll(nedc, o
     assert page.locator("#h-calibration").inner_text() == "Calibration of the rules"
     assert page.locator("#figure-sankey.wider").count() == 1
     assert page.locator("#figure-fuel-bars.wider").count() == 0
+    until(page, "document.querySelectorAll('#flow-apart .ytick text').length > 2")
+    # No label of the two rows' difference is cut, and the bar of the rows covers no heading.
+    assert page.evaluate(CUT, "flow-apart") == []
+    page.evaluate("document.getElementById('energy').scrollIntoView()")
+    bar, heading = (page.locator(name).bounding_box() for name in (".chooser", "#energy h2"))
+    assert bar["y"] + bar["height"] <= heading["y"]
 
 
 def test_forty_rows_of_1800_steps_stay_small_and_usable(opened, tmp_path):

@@ -17,6 +17,7 @@ from hevopt.sizing.candidates import Fate
 from hevopt.sizing.requirements import RequirementFile, reached
 from hevopt.sizing.study_file import read_size_study
 from hevopt.studies.case import dp_case
+from hevopt.sweeps.store.reading import open_to_read
 
 FAST = '[[require]]\nfigure = "time_to_speed_s"\nspeed_kmh = 100\nboost = true\nat_most = {}\n'
 SIZES = {"engine.scale.displacement": (1.0,), "machine.scale.power": (0.7, 1.5)}
@@ -78,6 +79,12 @@ def test_the_search_repeats_itself_and_takes_what_the_store_has(sized):
     for one in first.found:
         if one.fate is Fate.DISCARDED:
             assert one.bounds[0] >= min(solved)
+    with open_to_read(first.store) as reader:
+        pruned = {found.design: found for found in reader.pruned()}
+    discarded = {one.design.number: one for one in first.found if one.fate is Fate.DISCARDED}
+    assert pruned.keys() == discarded.keys() and pruned
+    for number, one in pruned.items():
+        assert one.bound == discarded[number].bounds[0] >= one.objective
 
 
 def test_a_front_of_fuel_and_price_has_no_design_that_another_beats(sized):
@@ -152,6 +159,7 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_store(tmp_path, mon
     assert call(monkeypatch, capsys, "report", tmp_path / "s.sqlite", "--out", page).status == 0
     section = page.read_text().partition("Proven of the sizes")[2].partition("</ul>")[0]
     assert "no design of this lattice is below" in section and "l/100 km" in section
+    assert "Sizing s.toml" in page.read_text() and "no result yet" not in page.read_text()
     again = call(monkeypatch, capsys, "size", path, "--json")
     found = json.loads(again.out)
     assert found["lattice"] and found["designs"]["tried"] == 2

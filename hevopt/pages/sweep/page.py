@@ -51,7 +51,7 @@ def sweep_page(sweep: Sweep) -> str:
         ("sweep.js",),
         _packed(data.encode()),
         sweep=sweep,
-        title=f"Sweep {_study_file(sweep).name or sweep.name}",
+        title=f"{'Sizing' if PROVEN in sweep.meta else 'Sweep'} {_study_file(sweep).name or sweep.name}",
         architecture=_architecture(sweep),
         weighted=bool(figures.weight.any()),
         verdict=verdict(sweep, groups),

@@ -145,9 +145,9 @@ const Flow = (() => {
     return { height: 70 + 22 * Math.max(lines.length, 1), data: [{ type: "bar", orientation: "h", y: lines.map((line) => plain(line.name)), x: lines.map((line) => line.own - line.other),
       marker: { color: lines.map((line) => look.colours[line.own > line.other ? 1 : 3]), line: { color: look.ink, width: 0.6 } },
       customdata: lines.map((line) => [line.own, line.other]), hovertemplate: "%{y}: %{customdata[0]:.1f} kJ, the other %{customdata[1]:.1f} kJ<extra></extra>" }],
-      layout: layout(look, width, { bargap: 0.3, margin: { l: narrow(width) ? 130 : 190, r: 16, t: 8, b: 44 },
-        xaxis: axis(look, `${plain(nameOf(Shown.results.rows[Shown.chosen]))} less ${plain(nameOf(Shown.results.rows[Shown.over]))} (kJ)`, { zeroline: true, zerolinewidth: 1.2, fixedrange: true }),
-        yaxis: axis(look, "", { ticks: "", fixedrange: true, showgrid: false, automargin: false, tickfont: { size: 11 } }) }) };
+      layout: layout(look, width, { bargap: 0.3, margin: { l: narrow(width) ? 130 : 190, r: 16, t: 8, b: narrow(width) ? 58 : 44 },
+        xaxis: axis(look, `${plain(nameOf(Shown.results.rows[Shown.chosen]))}${narrow(width) ? "<br>" : " "}less ${plain(nameOf(Shown.results.rows[Shown.over]))} (kJ)`, { zeroline: true, zerolinewidth: 1.2, fixedrange: true }),
+        yaxis: axis(look, "", { ticks: "", fixedrange: true, showgrid: false, automargin: true, tickfont: { size: 11 } }) }) };
   }
 
   return { sankey, differences };

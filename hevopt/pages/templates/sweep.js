@@ -177,9 +177,20 @@
 
   // Main effects ----------------------------------------------------------------------------------------------------
 
+  // What stands at the values in order: nothing at one so near to the last that their figures would touch.
+  function apart(e) {
+    const places = e.values.map((value) => (e.log ? Math.log(value) : value)), room = (places[places.length - 1] - places[0]) / 8;
+    let last = -Infinity;
+    return e.values.map((value, k) => {
+      if (places[k] - last < room) return "";
+      last = places[k];
+      return significant(value);
+    });
+  }
+
   // Where an axis has marks: at the values, or where there are bins at round numbers.
   function marks(e) {
-    if (!e.binned && e.values.length <= 8) return { tickvals: e.values, ticktext: e.values.map(significant) };
+    if (!e.binned && e.values.length <= 8) return { tickvals: e.values, ticktext: apart(e) };
     if (!e.log) return { nticks: 6, tickformat: "~g" };
     const round = [];
     for (let p = Math.floor(Math.log10(e.low[0])); p <= Math.log10(e.high[e.high.length - 1]); p++) round.push(...[1, 2, 5].map((m) => Number(`${m}e${p}`)));
