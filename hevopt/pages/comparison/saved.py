@@ -16,7 +16,7 @@ from hevopt.pages.comparison.saved_car import CarFigures
 
 _ADVICE = "give a file written by hevopt compare --save"
 _MAGIC = b"\x1f\x8b"
-_FAULTS_LISTED = 5
+_FAULTS_LISTED, _FAULT_CHARACTERS = 5, 200
 _ROUNDING_PERCENT = 1e-6
 # What every solved row has; the others do not exist for every engine, fuel or bound.
 _FIGURES_OF_A_SOLVED_ROW = (
@@ -39,9 +39,9 @@ def load_results(path: Path) -> Results:
             for fault in error.errors(include_input=False, include_url=False)
         ]
     if results is None or faults:
-        raise DataError(
-            f"{path}: not a saved comparison ({'; '.join(faults[:_FAULTS_LISTED])}); {_ADVICE}"
-        )
+        # Names in the file may be of any length.
+        said = "; ".join(fault[:_FAULT_CHARACTERS] for fault in faults[:_FAULTS_LISTED])
+        raise DataError(f"{path}: not a saved comparison ({said}); {_ADVICE}")
     return results
 
 

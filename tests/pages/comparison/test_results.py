@@ -87,6 +87,12 @@ def _changed(nedc, change):
             lambda nedc: _changed(nedc, lambda c: c["cars"].pop("C2")),
             "rows.8.*no car",
         ),
+        (
+            lambda nedc: _changed(
+                nedc, lambda c: c["rows"][3]["figures"].update(architecture="a" * 100_000)
+            ),
+            "rows.3: no car 'aaa",
+        ),
     ],
 )  # fmt: skip
 def test_a_file_that_is_not_a_saved_comparison_is_refused_with_a_reason(nedc, tmp_path, make, says):
@@ -95,6 +101,7 @@ def test_a_file_that_is_not_a_saved_comparison_is_refused_with_a_reason(nedc, tm
     with pytest.raises(DataError, match=says) as stop:
         load_results(path)
     assert "hevopt compare --save" in str(stop.value) and str(path) in str(stop.value)
+    assert len(str(stop.value)) < 2000
 
 
 def test_a_missing_file_is_named(tmp_path):
