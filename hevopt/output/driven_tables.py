@@ -26,7 +26,7 @@ SINKS = {
     "clutch_start_w": "clutch, starts",
     "clutch_other_w": "clutch, else",
     "gearbox_loss_w": "gearbox",
-    "gear_loss_w": "machine's gear",
+    "gear_loss_w": "gear pairs",
     "machine_loss_w": "machine",
     "battery_loss_w": "battery's loss",
     "converter_loss_w": "converter",

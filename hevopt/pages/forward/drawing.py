@@ -41,7 +41,10 @@ def drawn_run(run: ForwardRun) -> dict[str, Any]:
         "gear": run.gear[ends - 1].tolist(),
         "rpm": mean(flows["engine_speed_radps"] * RPM_PER_RADPS),
         "engine": mean(flows["engine_torque_nm"]),
-        "machine": mean(flows["machine_torque_nm"]),
+        "machines": [
+            [name.replace("_", " "), mean(flows[f"{name}_torque_nm"])]
+            for name, _ in run.car.driveline.machines
+        ],
         "clutch": {cause: mean(flows[f"clutch_{cause}_w"] / 1e3) for cause in _CAUSES},
         "brakes": mean(flows["brake_power_w"] / 1e3),
         "soc": _rounded(100 * run.soc[ends], 4),

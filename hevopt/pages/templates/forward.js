@@ -19,7 +19,7 @@
         line(data.wanted, "wanted", look.muted, { line: { dash: "dot" } }), line(data.speed, "driven", c[5])]],
       ["gear", 0.8, [line(data.gear, "gear", c[5], stepped)], { dtick: 1 }],
       ["engine<br>(1/min)", 1, [line(data.rpm, "engine", c[5])]],
-      ["torque<br>(Nm)", 1.3, [line(data.engine, "engine", c[5]), line(data.machine, "machine", c[3])]],
+      ["torque<br>(Nm)", 1.3, [line(data.engine, "engine", c[5]), ...data.machines.map(([name, torque], n) => line(torque, name, c[[3, 1, 2][n % 3]]))]],
       ["clutch loss<br>(kW)", 1, Object.entries(CAUSES).map(([name, hue]) => line(data.clutch[name], name, c[hue]))],
       ["brakes<br>(kW)", 0.8, [line(data.brakes, "friction brakes", c[1])]],
       ["SOC (%)", 1.3, [line(data.plan, "backward", look.muted, { line: { dash: "dash" } }), line(data.soc, "driven", c[3])]],
