@@ -182,9 +182,10 @@ def certify(
 ) -> Certificate:
     """The certificate of a problem; with a rollout, its costate prices, and dearer rungs up to `target_gap`.
 
-    A rung that fails is left out and named in `failures`. Raises SolverError where a bound is above the rollout.
-    Warns, CoarseTableWarning, where the controls may be too few for what lies between them to be no better, by more
-    than 0.05 %, and nothing is known of it.
+    A rung that fails is left out and named in `failures`; left out is the lower-bound DP, which knows the
+    controls of the table alone, where prices prove the rollout within the target among these. Raises
+    SolverError where a bound is above the rollout. Warns, CoarseTableWarning, where the controls may be too few
+    for what lies between them to be no better, by more than 0.05 %, and nothing is known of it.
     """
     split = split_of(problem)
     choices = None if split is None else split.choices
@@ -206,6 +207,8 @@ def certify(
     if gap > target_gap and _touches_window(problem, rollout):
         _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout, choices))
         gap = _gap(certificate, rollout)
+    if gap > target_gap and choices is not None and _proven(problem, rollout, target_gap):
+        return certificate
     for nodes in LOWER_DP_NODES:
         if gap <= target_gap:
             break
@@ -216,6 +219,17 @@ def certify(
             certificate.recursions[Proof.LOWER_BOUND_DP] = Recursion(nodes, worth)
         gap = _gap(certificate, rollout)
     return certificate
+
+
+def _proven(problem: Problem, rollout: Trajectory, target_gap: float) -> bool:
+    """Whether prices prove a rollout within the target among the table's own controls: what a bound of every split
+    leaves open then lies between these, of which a recursion over the table says nothing."""
+    try:
+        line = costate_dual(problem, rollout)[-1]
+    except SolverError:
+        return False
+    bound_kg = line.value_kg + line.price_kgpj * (rollout.end_j - problem.end_min_j)
+    return rollout.cost_kg - bound_kg <= target_gap * abs(bound_kg)
 
 
 def _warn_of_coarseness(certificate: Certificate) -> None:

@@ -26,8 +26,9 @@ over stored energy asks for more, as a cost-to-go is not convex; lower_dp.py sta
    discharging power e P' - R (e P')²/U² drains that, or 0 where that is beyond the peak.
 5. Where s_0² is next to nothing no tangent is of use: then one point, the least cost and the least power of the
    cell, which r, rising, makes a bound by itself.
-6. An end of a cell is a control of the table where it can be used. Where it cannot, or the lines begin below it,
-   it is added too. None of this is dropped for moving more than the window holds: what lies next to it need not.
+6. An end of a cell is a control of the table where it can be used. Where it cannot, or is none (a knot of a map),
+   or the lines begin below it, it is added too. None of this is dropped for moving more than the window holds: what
+   lies next to it need not.
 7. What rounding may have done to the lines is taken off every cost of the step, of levels and of virtual controls.
 """
 
@@ -129,11 +130,11 @@ def _virtual_of(problem: Problem) -> Virtual | None:
     energy_j = cells.power_w * table.step_s[cells.step]
     cost = _cost_kg(problem, cells.fuel_kg, cells.nox_kg, energy_j)
     nodes_kg, nodes_w, needed = nodes_of(cost, cells.power_w, Worst.of(problem.battery))
-    for n, column in ((0, cells.low), (3, cells.high)):
+    for n, column, apart in ((0, cells.low, cells.apart[0]), (3, cells.high, cells.apart[1])):
         at = cells.step, column
         below = nodes_kg[n] < problem.cost_kg[at]
         below |= nodes_w[n] < table.battery_power_w[at]
-        needed[n] &= below | (table.reject[at] != 0)
+        needed[n] &= below | (table.reject[at] != 0) | apart
     entry, cell = np.nonzero(needed)
     return Virtual(
         cells.step[cell],

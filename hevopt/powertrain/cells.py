@@ -14,47 +14,37 @@ One torque u is chosen at a step of a state. Between two levels of it:
    cut on a part of the cell NOx is none there; both lines are then 0.
 6. Fuel may count as cut a little above the drag torque, and two torques be taken for one within rounding: the
    slack, the slope times that.
+7. Where fuel, or the machine's loss, is a measured map, a cell ends where the map bends as well, and it is straight
+   in between (knots.py).
 So for all levels of a step between the lowest and the highest that can be used. Torques beyond these, next to a
 limit that is no level, are not spoken of. Where a part of a car shows none of this, nothing is claimed of the car.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from hevopt.car.driveline import ENGINE
-from hevopt.car.slopes import cut_nm, fuel_slopes, loss_slopes, nox_bend, nox_slopes
+from hevopt.car.slopes import loss_slopes
 from hevopt.powertrain.branches import Driven, Piece
-from hevopt.powertrain.operation import Flowing, Setting, completed, flowing, setting
-from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.powertrain.burnt import burnt_lines
+from hevopt.powertrain.knots import (
+    TOUCH_NM,
+    Inside,
+    has_engine_map,
+    has_machine_map,
+    inside,
+    knots_nm,
+)
+from hevopt.powertrain.operation import completed, flowing, setting
+from hevopt.powertrain.split_levels import CellLevels, Sides, Worked, tangents
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.cells import SplitCells, TableFigures, joined
 
-_TOUCH_NM = 1e-9
 # Share of a step's greatest figure by which a level worked out again may differ from the table's.
 _SAME = 1e-12
 # Powers of so little count as none.
 _ZEROED_W = 4e-9
-
-
-class _Sides(NamedTuple):
-    """Slopes over the chosen torque towards less and towards more of it, (state, level)."""
-
-    left: Array
-    right: Array
-
-
-class _Levels(NamedTuple):
-    """Levels of a piece by rising torque, (state, level), and where they stand in the table.
-
-    open: whether a cell begins at a level: within those that can be used, and not at the highest
-    """
-
-    here: Setting
-    name: str
-    torque_nm: Array
-    column: Indices
-    open: Flags
 
 
 def cells_of(branches: Sequence[Driven], figures: TableFigures) -> SplitCells | None:
@@ -79,7 +69,7 @@ def cells_of(branches: Sequence[Driven], figures: TableFigures) -> SplitCells | 
     return joined(parts, steps)
 
 
-def _levels(piece: Piece, first: int, figures: TableFigures) -> _Levels | None:
+def _levels(piece: Piece, first: int, figures: TableFigures) -> CellLevels | None:
     """The levels at the states of a piece that have more than one to choose; None where no state has."""
     if not piece.given:
         return None
@@ -89,61 +79,120 @@ def _levels(piece: Piece, first: int, figures: TableFigures) -> _Levels | None:
     if not len(some):
         return None
     torque, usable = torque[some], usable[some]
-    order = np.argsort(torque, axis=1, kind="stable")
-    torque = np.take_along_axis(torque, order, axis=1)
-    usable = np.take_along_axis(usable, order, axis=1)
-    open_ = np.maximum.accumulate(usable, axis=1)
-    open_ &= np.maximum.accumulate(usable[:, ::-1], axis=1)[:, ::-1]
-    begins = np.zeros_like(open_)
-    begins[:, :-1] = open_[:, 1:] & open_[:, :-1] & (np.diff(torque, axis=1) > 0)
     here = setting(piece.here.car, piece.here.way, piece.here.shafts.picked(some))
-    return _Levels(here, name, torque, first + order, begins)
+    low = np.where(usable, torque, np.inf).min(axis=1, keepdims=True)
+    high = np.where(usable, torque, -np.inf).max(axis=1, keepdims=True)
+    column = np.broadcast_to(first + np.arange(torque.shape[1]), torque.shape)
+    own = np.ones(torque.shape, dtype=bool)
+    knots = knots_nm(here, name) if name in here.machines else np.zeros((len(some), 0))
+    if knots.shape[1]:
+        # One that is not met, or beyond what can be used, stands once more for the highest.
+        knots = np.where((knots > low) & (knots < high), knots, high)
+        torque = np.hstack([torque, knots])
+        column = np.hstack([column, np.full(knots.shape, first)])
+        own = np.hstack([own, np.zeros(knots.shape, dtype=bool)])
+    order = np.argsort(torque, axis=1, kind="stable")
+    torque, column, own = (np.take_along_axis(v, order, axis=1) for v in (torque, column, own))
+    begins = np.zeros_like(own)
+    begins[:, :-1] = (torque[:, :-1] >= low) & (torque[:, 1:] <= high)
+    begins[:, :-1] &= np.diff(torque, axis=1) > 0
+    return CellLevels(here, name, torque, column, own, begins)
 
 
-def _cells(levels: _Levels, figures: TableFigures) -> SplitCells | None:
-    here, name, torque = levels.here, levels.name, levels.torque_nm
-    if set(here.machines) != {name}:
+def _cells(levels: CellLevels, figures: TableFigures) -> SplitCells | None:
+    here, name = levels.here, levels.name
+    worked = _worked(levels, figures) if set(here.machines) == {name} else None
+    if worked is None:
         return None
-    torques = completed(here, {name: torque})
+    maps = has_engine_map(here) or has_machine_map(here, name)
+    between = inside(here, name, levels.torque_nm, levels.open) if maps else None
+    burnt = None if maps and between is None else burnt_lines(levels, worked, between)
+    power = None if burnt is None else _power_lines(levels, worked, between)
+    if burnt is None or power is None:
+        return None
+    step, (state, low) = here.shafts.step, np.nonzero(levels.open)
+    ends = np.array([low, low + 1])
+    slack = np.zeros(len(figures.step_s))
+    np.maximum.at(slack, step, np.max(burnt.slack * worked.length_s, axis=1))
+    first, last = levels.column[state, ends]
+    cells = SplitCells(
+        step[state],
+        first,
+        last,
+        burnt.fuel,
+        burnt.nox,
+        power,
+        slack,
+        ~levels.own[state, ends],
+    )
+    if between is None:
+        return cells
+    return joined(
+        [cells.kept(between.known[state, low]), _at_knots(levels, worked, slack)], len(slack)
+    )
+
+
+def _worked(levels: CellLevels, figures: TableFigures) -> Worked | None:
+    """None where a level is not what the table says."""
+    here, own = levels.here, levels.own
+    torques = completed(here, {levels.name: levels.torque_nm})
     found, step = flowing(here, torques), here.shafts.step
-    at = step[:, None], levels.column
-    length_s = figures.step_s[step][:, None]
+    at, length_s = (step[:, None], levels.column), figures.step_s[step][:, None]
     fuel, nox, power = (values[at] for values in figures[:3])
     machines_w = np.broadcast_to(found.machines_w, power.shape)
-    if not _same(figures.usable[at], fuel - found.fuel_kgps * length_s, fuel) or not _same(
-        figures.usable[at], _apart(power - machines_w, figures.usable[at]), power, _ZEROED_W
+    usable = figures.usable[at] & own
+    rest, first = power - machines_w, np.argmax(usable, axis=1)[:, None]
+    rest_w = np.take_along_axis(rest, first, axis=1)
+    if not _same(usable, fuel - found.fuel_kgps * length_s, fuel) or not _same(
+        usable, rest - rest_w, power, _ZEROED_W
     ):
         return None
-    power_sides = _power_sides(levels)
-    burnt = _burnt(levels, torques.get(ENGINE), found)
-    if power_sides is None or burnt is None:
-        return None
-    state, low = np.nonzero(levels.open)
-    width = torque[state, low + 1] - torque[state, low]
-    length = figures.step_s[step[state]]
-
-    def lines(values: Array, sides: _Sides, fall: Array | float = 0.0) -> Array:
-        start, end = values[state, low], values[state, low + 1]
-        right, left = sides.right[state, low], sides.left[state, low + 1]
-        return np.array([[start, start + right * width - fall], [end - left * width - fall, end]])
-
-    fuel_lines = lines(fuel, _Sides(*(side * length_s for side in burnt.fuel)))
-    flat = burnt.nox_apart[state, low]
-    nox_lines = lines(nox, _Sides(*(side * length_s for side in burnt.nox)))
-    nox_lines[0, 1] -= burnt.nox_fall[0][state, low] * length
-    nox_lines[1, 0] -= burnt.nox_fall[1][state, low] * length
-    nox_lines = np.where(flat, 0.0, nox_lines)
-    slack = np.zeros(len(figures.step_s))
-    np.maximum.at(slack, step, np.max(burnt.slack * length_s, axis=1))
-    return SplitCells(
-        step[state],
-        levels.column[state, low],
-        levels.column[state, low + 1],
-        fuel_lines,
-        nox_lines,
-        lines(power, power_sides),
-        slack,
+    return Worked(
+        np.where(own, fuel, found.fuel_kgps * length_s),
+        np.where(own, nox, found.nox_kgps * length_s),
+        np.where(own, power, machines_w + rest_w),
+        rest_w,
+        torques.get(ENGINE),
+        found,
+        length_s,
     )
+
+
+def _power_lines(levels: CellLevels, worked: Worked, between: Inside | None) -> Array | None:
+    state, low = np.nonzero(levels.open)
+    ends = levels.torque_nm[state, np.array([low, low + 1])]
+    if between is not None and has_machine_map(levels.here, levels.name):
+        chord = between.power.of(state, low).along(ends) + worked.rest_w[state, 0]
+        return np.array([chord, chord]) - _touched_w(levels, worked)[state]
+    sides = _power_sides(levels)
+    lines = None if sides is None else tangents(levels, worked.power_w, sides)
+    return lines if between is None or lines is None else lines - _touched_w(levels, worked)[state]
+
+
+def _touched_w(levels: CellLevels, worked: Worked) -> Array:
+    """(state,) what power may change by where a torque is taken for the knot beside it."""
+    width = np.diff(levels.torque_nm, axis=1)
+    wide = levels.open[:, :-1] & (width > 1e3 * TOUCH_NM)
+    steep = np.abs(np.diff(worked.power_w, axis=1)) / np.where(wide, width, 1.0)
+    steepest: Array = np.where(wide, steep, 0.0).max(axis=1)
+    return 4 * TOUCH_NM * steepest
+
+
+def _at_knots(levels: CellLevels, worked: Worked, slack: Array) -> SplitCells:
+    """What is at a knot, and at a level where fuel is cut, which what is next to it may jump down to: cells of no
+    width."""
+    within = levels.open.copy()
+    within[:, 1:] |= levels.open[:, :-1]
+    off: Flags = worked.found.off_engine_map | worked.found.off_machine_map
+    state, level = np.nonzero(within & ~off & (~levels.own | (worked.fuel_kg == 0)))
+    lowered = worked.power_w - _touched_w(levels, worked)[:, None]
+    fuel, nox, power = (
+        np.broadcast_to(values[state, level], (2, 2, len(state)))
+        for values in (worked.fuel_kg, worked.nox_kg, lowered)
+    )
+    column, apart = levels.column[state, level], np.ones((2, len(state)), dtype=bool)
+    step = levels.here.shafts.step[state]
+    return SplitCells(step, column, column, fuel, nox, power, slack, apart)
 
 
 def _same(usable: Flags, error: Array, values: Array, slack: float = 0.0) -> bool:
@@ -152,88 +201,8 @@ def _same(usable: Flags, error: Array, values: Array, slack: float = 0.0) -> boo
     return bool((np.abs(error) <= _SAME * scale + slack)[usable].all())
 
 
-def _apart(rest: Array, usable: Flags) -> Array:
-    """(state, level) how far the load beside the machines is from that at the state's first usable level."""
-    first = np.argmax(usable, axis=1)[:, None]
-    apart: Array = rest - np.take_along_axis(rest, first, axis=1)
-    return apart
-
-
-def _power_sides(levels: _Levels) -> _Sides | None:
+def _power_sides(levels: CellLevels) -> Sides | None:
     here, name = levels.here, levels.name
     speed, share = here.speed_radps(name)[:, None], here.active(name)[:, None]
     slopes = loss_slopes(here.machines[name], levels.torque_nm / share, speed)
-    return None if slopes is None else _Sides(*(speed + side for side in slopes))
-
-
-class _Burnt(NamedTuple):
-    """Slopes of fuel and NOx flow; all (state, level), where of cells at their low end.
-
-    nox_fall: what lines of NOx from the low and from the high end lose across a cell; nox_apart: cells in which NOx
-    may be none; slack: kg/s
-    """
-
-    fuel: _Sides
-    nox: _Sides
-    nox_fall: tuple[Array, Array]
-    nox_apart: Flags
-    slack: Array
-
-
-def _burnt(levels: _Levels, torque_nm: Array | None, found: Flowing) -> _Burnt | None:
-    here, shape = levels.here, levels.torque_nm.shape
-    none = np.zeros(shape)
-    if torque_nm is None or ENGINE not in here.way.active:
-        return _Burnt(_Sides(none, none), _Sides(none, none), (none, none), none > 1, none)
-    engine, speed, share = here.car.engine, here.engine_radps[:, None], here.active(ENGINE)[:, None]
-    over = _torque_sides(levels)
-    own = np.broadcast_to(torque_nm / share, shape)
-    fuel = fuel_slopes(engine, own, speed)
-    if over is None or fuel is None or np.isnan(own).any():
-        return None
-    touch = cut_nm(engine) + _TOUCH_NM
-    slack = 2 * touch * np.maximum(fuel.right, fuel.left)
-    fuel_sides = _chained(over, *fuel)
-    if not engine.nox_known:
-        return _Burnt(fuel_sides, _Sides(none, none), (none, none), none > 1, slack)
-    nox = nox_slopes(engine, own, speed)
-    if nox is None:
-        return None
-    width = np.diff(levels.torque_nm, axis=1, append=levels.torque_nm[:, -1:])
-    cut = engine.fuel_kgps(own, speed) == 0
-    nox_sides = _chained(over, *(np.where(cut, 0.0, side) for side in nox))
-    right, left = over.right, np.roll(over.left, -1, axis=1)
-    after = np.roll(own, -1, axis=1)
-    # A torque that falls first and then rises may come to the cut in between.
-    apart = (cut != np.roll(cut, -1, axis=1)) | ((right < 0) & (left > 0))
-    fall = []
-    for slope, start in ((right, own), (-left, after)):
-        reached = start + slope * width / share
-        bend = nox_bend(engine, np.minimum(start, reached), np.maximum(start, reached), speed)
-        fall.append(bend / share * slope**2 * width**2 / 2)
-    slack = np.maximum(slack, 2 * touch * np.maximum(nox.right, nox.left))
-    return _Burnt(fuel_sides, nox_sides, (fall[0], fall[1]), apart, slack)
-
-
-def _torque_sides(levels: _Levels) -> _Sides | None:
-    """Slopes of the engine's torque over the chosen one, friction brakes and lowest torque included."""
-    here = levels.here
-    found = here.torques.engine_slopes(levels.name, levels.torque_nm)
-    if found is None:
-        return None
-    left, right = found
-    if here.way.slack == ENGINE:
-        free = here.torques.solve(here.unbraked({levels.name: levels.torque_nm}), [ENGINE])[ENGINE]
-        above, stops = free - here.least_nm[:, None], (here.shafts.wheel_nm <= 0)[:, None]
-        held, edge = stops & (above < -_TOUCH_NM), stops & (np.abs(above) <= _TOUCH_NM)
-        left = np.where(held, 0.0, np.where(edge, np.minimum(left, 0.0), left))
-        right = np.where(held, 0.0, np.where(edge, np.maximum(right, 0.0), right))
-    return _Sides(left, right)
-
-
-def _chained(over: _Sides, left: Array, right: Array) -> _Sides:
-    """Slopes over the chosen torque from those over the engine's, whose own rise with it."""
-    return _Sides(
-        over.left * np.where(over.left > 0, left, right),
-        over.right * np.where(over.right > 0, right, left),
-    )
+    return None if slopes is None else Sides(*(speed + side for side in slopes))

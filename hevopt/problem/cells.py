@@ -30,6 +30,7 @@ class SplitCells(Shown):
     step, low, high: (cell,) step, and columns of the controls at the ends, of one mode
     fuel_kg, nox_kg, power_w: (line, end, cell) the lines' values at the cell's ends, 2 x 2 for each
     slack_kg: (time,) by how much at most the lines of fuel, and of NOx, may be too high at a step, by rounding
+    apart: (end, cell) whether an end is no control of the table; its column is then one of the same mode
     """
 
     step: Indices
@@ -39,6 +40,7 @@ class SplitCells(Shown):
     nox_kg: Array
     power_w: Array
     slack_kg: Array
+    apart: Flags
 
     def _facts(self) -> dict[str, object]:
         return {"cells": len(self.step), "steps": len(self.slack_kg)}
@@ -60,7 +62,8 @@ class SplitCells(Shown):
         fuel, nox, power = (
             lines[..., which] for lines in (self.fuel_kg, self.nox_kg, self.power_w)
         )
-        return SplitCells(self.step[which], low, high, fuel, nox, power, self.slack_kg)
+        apart = self.apart[:, which]
+        return SplitCells(self.step[which], low, high, fuel, nox, power, self.slack_kg, apart)
 
 
 class TableFigures(NamedTuple):
@@ -83,15 +86,16 @@ def joined(parts: list[SplitCells], steps: int) -> SplitCells:
     slack = np.max([part.slack_kg for part in parts], axis=0, initial=0.0)
     if not parts:
         none, lines = np.zeros(0, dtype=np.int64), np.zeros((2, 2, 0))
-        return SplitCells(none, none, none, lines, lines, lines, np.zeros(steps))
+        apart = np.zeros((2, 0), dtype=bool)
+        return SplitCells(none, none, none, lines, lines, lines, np.zeros(steps), apart)
     step, low, high = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("step", "low", "high")
     )
-    fuel, nox, power = (
+    fuel, nox, power, apart = (
         np.concatenate([getattr(part, name) for part in parts], axis=-1)
-        for name in ("fuel_kg", "nox_kg", "power_w")
+        for name in ("fuel_kg", "nox_kg", "power_w", "apart")
     )
-    return SplitCells(step, low, high, fuel, nox, power, slack)
+    return SplitCells(step, low, high, fuel, nox, power, slack, apart)
 
 
 def cells_between(
@@ -118,7 +122,8 @@ def cells_between(
     chord = np.array([power[pair], power[pair + 1]])
     slack = np.zeros(len(fuel_kg))
     np.maximum.at(slack, step[pair], _rounding_kg(pair, power, quantities))
-    return SplitCells(step[pair], low, high, fuel, nox, np.array([chord, chord]), slack)
+    apart = np.zeros((2, len(pair)), dtype=bool)
+    return SplitCells(step[pair], low, high, fuel, nox, np.array([chord, chord]), slack, apart)
 
 
 def _lines(between: Between, pair: Indices, power: Array, values: Array) -> Array:

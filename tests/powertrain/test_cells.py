@@ -4,31 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from between import below_lines, drains_w, samples_of
+from between import DRIVES, below_lines, drains_w, part, samples_of
 
-from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
+from hevopt import build_problem, certify, load_architecture, simulate, solve
 from hevopt.bounds import step_prices, virtual
 from hevopt.bounds.certificate import Scope
 
 WEIGHTS = (0.0, 10.0, 50.0)
-
-
-def part(cycle, begin, end):
-    """Some seconds of a cycle."""
-    whole = load_cycle(cycle)
-    cut = {
-        name: None if (values := getattr(whole, name)) is None else values[begin:end]
-        for name in ("speed_mps", "grade", "gear", "clutch_open")
-    }
-    return replace(whole, time_s=whole.time_s[begin:end] - whole.time_s[begin], **cut)
-
-
-DRIVES = {
-    "B": ("nedc", 0, 60),
-    "C2": ("nedc", 110, 190),
-    "D": ("us06", 40, 80),
-    "E": ("us06", 5, 35),
-}
 
 
 @pytest.fixture(scope="module", params=DRIVES)

@@ -66,7 +66,7 @@ def proven(problem: Problem, nodes: int) -> Iterator[tuple[Proof, Trajectory, Ce
         yield kind, plan, alone
 
 
-def again_faults(seed: int, nodes: int = 121) -> list[str]:
+def again_faults(seed: int, nodes: int = 301) -> list[str]:
     """What is wrong with the proofs of a drawn problem, of its table and of all that lies between levels."""
     problem, faults = draw(seed), []
     plans = [(cost, end) for cost, end, _ in every_plan(problem)]
