@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 KINDS = ("compressor", "turbine")
 _NAME_MAX = 80
 _WIDE_FLOW, _WIDE_EFFICIENCY = 0.05, 0.03
+# Estimates: brake efficiency at rated power, and a suitable map's largest flow over what the engine takes there.
+_RATED_EFFICIENCY, _SUITS = 0.36, (0.6, 4.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -64,6 +66,8 @@ def import_turbo(
     origins |= {f"{part}.{key}": "fitted to the map" for key in keys if key != "wheel_diameter_mm"}
     file = checked(f"component from {place}", base, EngineFile)
     notes = [*points.notes, *_kept(kind, like, values)]
+    if isinstance(fit, CompressorFit):
+        notes += _unsuited(file, float(fit.flow_kgps.max()))
     return ImportedTurbo(base, file, origins, tuple(notes), points, fit, tuple(said))
 
 
@@ -133,6 +137,24 @@ def _kept(kind: str, like: str | None, values: Mapping[str, Any]) -> list[str]:
         f"{kind}"
     )
     return said
+
+
+def _unsuited(file: EngineFile, most_kgps: float) -> list[str]:
+    """A warning where an engine takes far more or less air than a map has: kg/h for g/s fits as well."""
+    assert file.mean_value is not None
+    speed, torque = np.array(file.full_load.speed_rpm), np.array(file.full_load.torque_nm)
+    rated = int(np.argmax(speed * torque))
+    control = file.mean_value.control
+    excess = float(np.interp(speed[rated], control.lambda_rpm, control.lambda_full_load))
+    power = speed[rated] * torque[rated] / RPM_PER_RADPS
+    fuel = power / (_RATED_EFFICIENCY * file.fuel.heating_value_mjpkg * 1e6)
+    air = fuel * file.mean_value.cylinders.stoichiometric_air * excess
+    if _SUITS[0] * air <= most_kgps <= _SUITS[1] * air:
+        return []
+    return [
+        f"WARNING: the engine takes about {1e3 * air:.2g} g/s at rated power, and the map goes up to "
+        f"{1e3 * most_kgps:.2g} g/s; check the unit of flow, the reference, or whether it is this engine's"
+    ]
 
 
 def _compressor_said(points: TurboPoints, fit: CompressorFit) -> list[str]:

@@ -53,6 +53,17 @@ def test_points_of_a_compact_compressor_give_that_compressor(folder):
     assert np.abs(found.fit.off).max() < 1e-3 and np.abs(found.fit.efficiency_off).max() < 1e-3
 
 
+def test_a_unit_of_flow_that_fits_as_well_is_warned_of(folder):
+    """Grams per second said to be kilograms per hour; and a compressor of a truck."""
+    speed, flow, *rest = own_lines()
+    for share, warned in ((1.0, False), (1 / 3.6, True), (6.0, True)):
+        write("map.csv", HEADS, speed, share * flow, *rest)
+        wheel = {"mean_value.compressor.wheel_diameter_mm": 41.0 * max(share, 1.0) ** 0.5}
+        notes = "\n".join(imported("map.csv", "compressor", reference=AMBIENT, values=wheel).notes)
+        told = "WARNING: the engine takes about 88 g/s at rated power, and the map goes up to"
+        assert (told in notes) == warned, notes
+
+
 def test_what_flow_and_speed_are_corrected_to_makes_no_difference(folder):
     """The same wheel by another bench's reference, and reduced; in pounds and kilopascals."""
     speed, flow, *rest = own_lines()
