@@ -161,7 +161,7 @@ def plain_value(problem, chain, joined, ahead, z):
 
 def test_what_training_must_be_is_said(problem_of):
     problem = problem_of("C2", "nedc")
-    with pytest.raises(DataError, match="pass problems of the same car on other cycles"):
+    with pytest.raises(DataError, match="pass a list of problems of the same car"):
         sdp.solve(problem, [])
     with pytest.raises(DataError, match="same car"):
         sdp.solve(problem, [problem_of("E", "us06")])
