@@ -45,6 +45,7 @@ BLIND = {
 # Functions above 50 lines, each with its reason.
 LONG = {
     "forward._plant_kernels.step": "one implicit step, compiled as a whole",
+    "forward._slip_kernels.slip_step": "one implicit step, compiled as a whole",
     "forward._drive_kernels.after_step": "one step, compiled as a whole",
     "forward._pull_kernels.after_pull": "one step, compiled as a whole",
     "commands.driving.drive": "a list of options",

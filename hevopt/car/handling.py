@@ -7,6 +7,7 @@ above 0.625 s a slow one; a dry clutch's torque hardly depends on its slip (Mykl
 VPPC 2012). What no source gives is an estimate [E].
 """
 
+from math import atan, pi
 from typing import NamedTuple
 
 from hevopt.errors import DataError
@@ -20,14 +21,17 @@ class Tyre(NamedTuple):
     friction: highest force over wheel load, equation (4)
     driven_share: of the weight on the driven axle at rest [E]; height_share: height of the centre of mass over the
     wheelbase [E]
-    stiffness, shape, curvature: B, C, E of Pacejka's magic formula, a common set for dry tarmac
-    relaxation_m: travel in which slip builds up [E]
+    slips: the force comes by slip, in place of the lag
+    stiffness, shape, curvature: B, C, E of Pacejka's magic formula, a set for dry tarmac that is often shown, of no
+    measured tyre [E]; its peak is the friction
+    relaxation_m: travel in which slip builds up [E; 0.04 to above 0.3 m are published, mostly lateral]
     """
 
     lag_s: float = 0.03
     friction: float = 0.85
     driven_share: float = 0.60
     height_share: float = 0.20
+    slips: bool = False
     stiffness: float = 10.0
     shape: float = 1.9
     curvature: float = 0.97
@@ -38,6 +42,12 @@ class Tyre(NamedTuple):
         """Highest acceleration that the driven axle holds on a level road, the load moved by it included."""
         held = self.friction * self.driven_share * STANDARD_GRAVITY_MPS2
         return held / (1 + self.friction * self.height_share)
+
+    @property
+    def peaks(self) -> bool:
+        """Whether the magic formula has its peak at a slip of no more than 1."""
+        bent = self.stiffness - self.curvature * (self.stiffness - atan(self.stiffness))
+        return self.shape * atan(bent) >= pi / 2
 
 
 class Clutch(NamedTuple):
@@ -105,6 +115,12 @@ class Handling(NamedTuple):
         for part in (self.tyre, self.clutch, self.shifting):
             if part is not None:
                 check_ranges(part)
+        if self.tyre.slips and not self.tyre.peaks:
+            raise DataError(
+                f"tyre: with stiffness {self.tyre.stiffness:g}, shape {self.tyre.shape:g} and curvature "
+                f"{self.tyre.curvature:g} the force has no peak up to a slip of 1; raise shape or stiffness, "
+                "or lower curvature"
+            )
 
 
 # Of tyres, clutch and gear changes, in a car's file as in the loops: lowest and highest.
@@ -113,6 +129,7 @@ RANGES = {
     "friction": (0.05, 2.0),
     "driven_share": (0.05, 1.0),
     "height_share": (0.0, 1.0),
+    "slips": (0.0, 1.0),
     "stiffness": (0.1, 100.0),
     "shape": (0.5, 3.0),
     "curvature": (-20.0, 1.0),

@@ -3,9 +3,9 @@
 What is left out is that of hevopt.car.handling, where every default stands with its source.
 """
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from hevopt.car.handling import RANGES, Clutch, DriverGains, Handling, Shifting, Tyre
 from hevopt.files.toml import FileModel
@@ -26,6 +26,27 @@ class TyreFile(FileModel):
     friction: Annotated[float, _within("friction")] | None = None
     driven_share: Annotated[float, _within("driven_share")] | None = None
     height_share: Annotated[float, _within("height_share")] | None = None
+    law: Literal["lag", "pacejka"] | None = None
+    stiffness: Annotated[float, _within("stiffness")] | None = None
+    shape: Annotated[float, _within("shape")] | None = None
+    curvature: Annotated[float, _within("curvature")] | None = None
+    relaxation_m: Annotated[float, _within("relaxation_m")] | None = None
+
+    @model_validator(mode="after")
+    def _check_law(self) -> "TyreFile":
+        """Only keys that the law reads, and a peak of the force."""
+        of_slip = ("stiffness", "shape", "curvature", "relaxation_m")
+        read, law = ("lag_s",) if self.law == "pacejka" else of_slip, self.law or "lag"
+        if unread := [key for key in read if getattr(self, key) is not None]:
+            other = "lag" if self.law == "pacejka" else "pacejka"
+            raise ValueError(
+                f'{", ".join(unread)}: not read with law {law!r}; leave it out, or give law = "{other}"'
+            )
+        if law == "pacejka" and not tyre_of(self).peaks:
+            raise ValueError(
+                "the force has no peak up to a slip of 1; raise shape or stiffness, or lower curvature"
+            )
+        return self
 
 
 class ClutchFile(FileModel):
@@ -70,12 +91,19 @@ def handling_of(
 ) -> Handling:
     """A car's handling by the tables of its file; gap_s: of a change of gear where [shifting] gives none."""
     return Handling(
-        Tyre(**_given(tyre)),
+        Tyre() if tyre is None else tyre_of(tyre),
         Clutch(**_given(clutch)),
         None if shifting is None else Shifting(**{"gap_s": gap_s, **_given(shifting)}),
         DriverGains(**_given(driver)),
     )
 
 
-def _given(table: FileModel | None) -> dict[str, float]:
+def tyre_of(table: TyreFile) -> Tyre:
+    """The tyres of a file."""
+    given = _given(table)
+    slips = given.pop("law", "lag") == "pacejka"
+    return Tyre(**given, slips=slips)
+
+
+def _given(table: FileModel | None) -> dict[str, Any]:
     return {} if table is None else table.model_dump(exclude_none=True)

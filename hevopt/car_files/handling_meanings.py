@@ -12,6 +12,14 @@ HANDLING_MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
             "-",
             "height of the centre of mass over the wheelbase; 0.20 where left out",
         ),
+        "law": (
+            "",
+            "lag: a force behind its torque on wheels that roll; pacejka: by their slip; lag where left out",
+        ),
+        "stiffness": ("-", "B of the magic formula, of law pacejka; 10 where left out"),
+        "shape": ("-", "C of the magic formula; 1.9 where left out"),
+        "curvature": ("-", "E of the magic formula; 0.97 where left out"),
+        "relaxation_m": ("m", "travel in which slip builds up; 0.25 where left out"),
     },
     "ClutchFile": {
         "slipping_nm": ("Nm", "highest torque at high slip; 420 where left out"),

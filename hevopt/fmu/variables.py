@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.forward import _drive_kernels as col
 from hevopt.forward.commanded import CommandedCar, CommandedSteps
 from hevopt.forward.run import STEP_RANGE_S
 
@@ -103,12 +104,18 @@ def _mean(flow: str) -> Callable[[CommandedCar, CommandedSteps | None], float]:
     return value
 
 
+def _mean_column(column: int) -> Callable[[CommandedCar, CommandedSteps | None], float]:
+    def value(one: CommandedCar, moved: CommandedSteps | None) -> float:
+        return 0.0 if moved is None else float(np.mean(moved.record[:, column]))
+
+    return value
+
+
 def _acceleration(one: CommandedCar, moved: CommandedSteps | None) -> float:
     if moved is None:
         return 0.0
-    kinetic, speed = (moved.books.flows[name] for name in ("kinetic_w", "speed_mps"))
-    forces = np.divide(kinetic, speed, out=np.zeros_like(speed), where=speed > 0)
-    return float(np.mean(forces)) / one.car.vehicle.equivalent_mass_kg
+    gained = 2 * (moved.record[:, col.SPEED] - moved.books.flows["speed_mps"])
+    return float(np.mean(gained)) / one.step_s
 
 
 def _unbalanced(one: CommandedCar, moved: CommandedSteps | None) -> float:
@@ -143,7 +150,10 @@ OUTPUTS: Sequence[UnitOutput] = (
     UnitOutput("machine_electric_w", "real", "W", "electric power of the machine", _mean("machine_electric_w")),
     UnitOutput("battery_power_w", "real", "W", "power at the battery's terminals, > 0 out of it",
          _mean("battery_power_w")),
-    UnitOutput("unbalanced_w", "real", "W", "power that does not add up, of all components: rounding", _unbalanced),
+    UnitOutput("unbalanced_w", "real", "W", "power that does not add up, of all components: rounding",
+               _unbalanced),
+    UnitOutput("tyre_force_n", "real", "N", "force of the driven tyres", _mean_column(col.TYRE)),
+    UnitOutput("tyre_slip", "real", "1", "slip of the driven tyres, 0 where they roll", _mean_column(col.SLIP)),
     UnitOutput("gear", "integer", "", "gear that is in, or being changed to; 0 before the first step",
          lambda one, moved: 0 if moved is None else moved.gear),
     UnitOutput("engine_phase", "integer", "", "0 at rest, 1 started, 2 turning, 3 stopped",

@@ -9,7 +9,7 @@ from hevopt._compile import compiled
 from hevopt.car.handling import DriverGains, Shifting
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
-from hevopt.forward._contact_kernels import Body
+from hevopt.forward._contact_kernels import Body, wheel_radps
 from hevopt.forward._lever_kernels import (
     Lever,
     keeping_pace_nm,
@@ -146,7 +146,7 @@ def inputs_of(
     """The plant's inputs: how the engine is kept, what the clutch and the brakes hold."""
     limits, driver = car.limits, car.driver
     way, output = lever.way, len(car.ways.inertia_kgm2) - 1
-    wheel, n = state.speed_mps / car.body.radius_m, state.side_radps
+    wheel, n = wheel_radps(state.speed_mps, state.spin_radps, car.body), state.side_radps
     ratio = turning(car.ways.wheel, way, lever.from_way, lever.blend, output)
     low, high = gives
     rate, capacity, engine = 1.0 - np.exp(-step_s / driver.governor_s), 0.0, split.engine_nm
@@ -202,7 +202,8 @@ def split_of(
     joints, moves, pace = car.ways.load.shape[2], moves_machine(car.ways, lever), 0.0
     cut = moves and lever.gap_s > 0.0
     if moves:
-        pace = keeping_pace_nm(car.ways, state, lever, state.speed_mps / car.body.radius_m, step_s)
+        wheel = wheel_radps(state.speed_mps, state.spin_radps, car.body)
+        pace = keeping_pace_nm(car.ways, state, lever, wheel, step_s)
         per_nm = rows[lever.way, state.variant, col.MACHINES]
         low, high = (0.0, 0.0) if cut else (asked.low_nm, asked.high_nm)
         set_nm = 0.0 if cut else min(max(asked.set_nm + pace, low), high)

@@ -56,6 +56,21 @@ def pacejka_share(slip: float, tyre: Tyre) -> float:
 
 
 @compiled()
+def pacejka_slope(slip: float, tyre: Tyre) -> float:
+    """Its derivative by slip."""
+    stretched = tyre.stiffness * slip
+    bent = stretched - tyre.curvature * (stretched - np.arctan(stretched))
+    rises = tyre.stiffness * (1.0 - tyre.curvature * stretched**2 / (1.0 + stretched**2))
+    return float(tyre.shape * np.cos(tyre.shape * np.arctan(bent)) / (1.0 + bent**2) * rises)
+
+
+@compiled(inline="always")
+def wheel_radps(speed_mps: float, spin_radps: float, body: Body) -> float:
+    """Speed of the driven wheels."""
+    return speed_mps / body.radius_m + spin_radps
+
+
+@compiled()
 def resistance(speed: float, slope_rad: float, body: Body) -> tuple[float, float, float]:
     """Rolling and air resistance, its derivative by speed, and the weight's share along the road."""
     r, a, cos, sin = body.rolling_n, body.air_n, 1.0, 0.0

@@ -21,7 +21,7 @@ from hevopt.forward._acting_kernels import (
     is_called,
     split_of,
 )
-from hevopt.forward._contact_kernels import Pace, pace_of
+from hevopt.forward._contact_kernels import Pace, pace_of, wheel_radps
 from hevopt.forward._lever_kernels import Lever, changed, resting_lever
 from hevopt.forward._limits_kernels import Gives, by_map, electric_w, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
@@ -39,9 +39,10 @@ ENGINE, MACHINE, CLUTCH, WHEEL, BRAKE, HELD, TYRE, ROAD = range(7, 15)
 # and its driver: force asked for, as numbers of _motor_kernels the engine's phase and why the clutch slips; whether
 # all is given and too little; and the directions in which power passed the joints
 ASKED, PHASE, CAUSE, FULL, VARIANT = range(15, 20)
-# Torque lost in a gearbox with a map, at its input; behind it the torques of machines beyond the first.
-LOST = 20
-COLUMNS = 21
+# Torque lost in a gearbox with a map, at its input; what the wheels turn beyond rolling, and the tyres' slip.
+# Behind them the torques of machines beyond the first.
+LOST, SPIN, SLIP = range(20, 23)
+COLUMNS = 23
 
 
 class Work(NamedTuple):
@@ -93,7 +94,7 @@ def begun(car: LoopCar, task: LoopTask, start_j: float) -> Loop:
     on = task.engine_on[0]
     turns = car.ways.wheel[task.way[0], output] * task.speed_mps[0] / car.body.radius_m
     side = max(car.limits.idle_radps, turns) if on else 0.0
-    state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0)
+    state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0, 0.0, 0.0)
     lever, pedal = resting_lever(task.way[0]), PedalState(0.0, 0.0, 0.0, 0.0, True)
     joint = motor.Joined(motor.TURNING if on else motor.REST, 1.0 if side == turns else 0.0, False, 0,
                          car.limits.idle_radps)  # fmt: skip
@@ -133,11 +134,12 @@ def after_step(
     state, pedal, lever, joint, energy, wanted = loop
     at_s, k, d = place
     ahead = wanted_at(task.time_s, task.speed_mps, at_s + step_s + car.driver.preview_s, k)
-    wheel, slope = state.speed_mps / car.body.radius_m, task.slope_rad[k]
+    wheel = wheel_radps(state.speed_mps, state.spin_radps, car.body)
+    rolling, slope = state.speed_mps / car.body.radius_m, task.slope_rad[k]
     pedal = pressed(pedal, wanted, ahead, state.speed_mps, slope, car.body, car.driver, step_s)
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     keeps_nm = pace_nm(machine, car.limits)
-    lever = changed(lever, task.way[d], wheel, car.ways, car.fast_way, car.fast_radps,
+    lever = changed(lever, task.way[d], rolling, car.ways, car.fast_way, car.fast_radps,
                     car.shifting, step_s, keeps_nm)  # fmt: skip
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     machine += car.ways.side[lever.way, 1] * state.side_radps
@@ -155,8 +157,8 @@ def after_step(
     machine_nm[0] = given.machine_nm
     inputs = inputs_of(car, state, pedal, joint, lever, given, gives, slope, machine_nm, step_s)
     state, out = step(car.body, car.ways, rows, state, inputs, pace, work.moving)
-    mean = 0.5 * (machine + turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
-                  * state.speed_mps / car.body.radius_m
+    rate = turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
+    mean = 0.5 * (machine + rate * state.speed_mps / car.body.radius_m + rate * state.spin_radps
                   + car.ways.side[state.way, 1] * state.side_radps)  # fmt: skip
     power = electric_w(given.machine_nm, mean, car.limits)
     power += task.load_w[0 if phase == motor.REST else 1, k]
@@ -175,7 +177,7 @@ def after_step(
     row[HELD], row[TYRE], row[ROAD] = out.held_nm, out.force_n, out.road_n
     row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, joint.cause
     row[FULL], row[VARIANT] = 1.0 if given.full else 0.0, state.variant
-    row[LOST] = state.lost_nm
+    row[LOST], row[SPIN], row[SLIP] = state.lost_nm, state.spin_radps, state.slip
     return Loop(state, pedal, lever, joint, energy, ahead), given.wanted_nm
 
 

@@ -27,8 +27,8 @@ from hevopt.forward._free_kernels import (
 )
 from hevopt.forward._limits_kernels import by_map, limit_nm, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
-from hevopt.forward._plant_kernels import Outputs, step
-from hevopt.forward._rows_kernels import Array, Inputs, State
+from hevopt.forward._plant_kernels import step
+from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State
 from hevopt.problem._battery_kernels import chemical_power_at
 
 _CLOSED_SLIP_RADPS = 1.0
@@ -56,7 +56,7 @@ def begun(car: FreeCar, task: LoopTask, course: FreeCourse, start_j: float) -> F
     """The loop before its first step."""
     on = task.engine_on[0]
     side = max(course.engine_radps[0], car.loop.limits.idle_radps) if on else 0.0
-    state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0)
+    state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0, 0.0, 0.0)
     closing = 1.0 if on and course.closed[0] else 0.0
     return FreeLoop(state, PedalState(0.0, 0.0, 0.0, 0.0, True), motor.TURNING if on else motor.REST,
                     closing, start_j, task.speed_mps[0])  # fmt: skip

@@ -12,13 +12,21 @@ capacity (16): Coulomb friction, implicit, without events. The brake is Coulomb 
 Powers taken with the mean of the speeds before and after are exact differences of kinetic energy.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.forward._contact_kernels import Body, Pace, grip_n, resistance
-from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, lost_nm, turning
+from hevopt.forward._rows_kernels import (
+    Array,
+    Inputs,
+    Outputs,
+    State,
+    Ways,
+    fill_row,
+    lost_nm,
+    turning,
+)
+from hevopt.forward._slip_kernels import slip_step
 from hevopt.forward._solve_kernels import (
     Motion,
     SolvedStep,
@@ -35,19 +43,6 @@ _ROUNDS = 12
 _SETTLED = 1e-13
 
 
-class Outputs(NamedTuple):
-    """Means over a step. held_nm: torque at the wheels that keeps a standing car from rolling back."""
-
-    engine_nm: float
-    clutch_nm: float
-    wheel_nm: float
-    brake_nm: float
-    held_nm: float
-    force_n: float
-    road_n: float
-    locked: bool
-
-
 @compiled()
 def step(
     body: Body, ways: Ways, rows: Array, state: State, inputs: Inputs, pace: Pace, row: Array
@@ -56,6 +51,8 @@ def step(
 
     rows: settled_rows(ways); pace: pace_of(step, lag of the tyre); row: as long as one of rows, for moving ratios
     """
+    if body.tyre.slips:
+        return slip_step(body, ways, rows, state, inputs, pace, row)
     wheel, per_s = state.speed_mps / body.radius_m, 1.0 / pace.step_s
     passive, rise, along = resistance(state.speed_mps, inputs.slope_rad, body)
     per_n = pace.step_s / (body.radius_m * body.equivalent_kg)
@@ -157,7 +154,7 @@ def _after(
         mean = pace.of_force * state.force_n + of_torque * torque / body.radius_m
     side = state.side_radps + solved.side
     after = State(
-        speed, force, side, inputs.way, inputs.from_way, inputs.blend, variant, lost
+        speed, force, side, inputs.way, inputs.from_way, inputs.blend, variant, lost, 0.0, 0.0
     )  # fmt: skip
     outputs = Outputs(
         solved.engine_nm, solved.clutch_nm, torque, brake, held, mean, road + along, solved.locked

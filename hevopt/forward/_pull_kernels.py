@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 from hevopt._compile import compiled
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._acting_kernels import LoopCar
-from hevopt.forward._contact_kernels import Pace, clutch_capacity_nm, pace_of, resistance
+from hevopt.forward._contact_kernels import (
+    Pace,
+    clutch_capacity_nm,
+    grip_n,
+    pace_of,
+    resistance,
+    wheel_radps,
+)
 from hevopt.forward._lever_kernels import (
     Lever,
     changed,
@@ -27,6 +34,8 @@ SPEED, DISTANCE, GEAR, ENERGY, SIDE, FORCE, MACHINE = range(7)
 COLUMNS = 7
 # How much of the last step's gain in speed an engine is brought ahead of the gears.
 _AHEAD = 1.1
+# Share of their peak that a launch leaves to tyres that slip [E].
+_HELD_SHARE = 0.95
 
 
 class Foot(NamedTuple):
@@ -86,7 +95,7 @@ def pull_begun(
     turns = max(ratio * speed / car.body.radius_m, car.limits.idle_radps)
     passive, _, along = resistance(speed, 0.0, car.body)
     state = State(speed, 0.0 if launches else passive + along, foot.launch_radps if launches else turns,
-                  way, way, 0.0, 0, 0.0)  # fmt: skip
+                  way, way, 0.0, 0, 0.0, 0.0, 0.0)  # fmt: skip
     return Pull(
         state, resting_lever(way), gear, launches, 0.0 if launches else 1.0, 0.0, 0.0, energy
     )
@@ -118,6 +127,14 @@ def _machine_nm(
     return min(max(_lacking_nm(way_row, full - most_nm), 0.0), high)
 
 
+@compiled()
+def _held_nm(car: LoopCar, row: Array, speed_mps: float) -> float:
+    """Torque of the clutch that a launch passes on tyres that slip: with more the wheels would spin up."""
+    passive, _, along = resistance(speed_mps, 0.0, car.body)
+    held_nm = _HELD_SHARE * grip_n(passive + along, 0.0, car.body) * car.body.radius_m
+    return float(held_nm / row[col.CLUTCH])
+
+
 @compiled(inline="always")
 def after_pull(
     car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, work: PullWork, pull: Pull, gives: Gives,
@@ -127,13 +144,13 @@ def after_pull(
     step_s, machine_nm, limits, radius = pace.step_s, work.machine_nm, car.limits, car.body.radius_m
     state, lever, gear, launches, closing, gained, distance, energy = pull
     output, way = len(car.ways.inertia_kgm2) - 1, by_gear[0]
-    wheel, n = state.speed_mps / radius, state.side_radps
+    wheel, n = wheel_radps(state.speed_mps, state.spin_radps, car.body), state.side_radps
     if n >= foot.up_radps and gear + 1 < len(by_gear) and not launches and closing == 1.0:
         gear, closing = gear + 1, 0.0
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     machine += car.ways.side[lever.way, 1] * n
-    lever = changed(lever, by_gear[gear], wheel, car.ways, car.fast_way, car.fast_radps, car.shifting,
-                    step_s, pace_nm(machine, limits))  # fmt: skip
+    lever = changed(lever, by_gear[gear], state.speed_mps / radius, car.ways, car.fast_way, car.fast_radps,
+                    car.shifting, step_s, pace_nm(machine, limits))  # fmt: skip
     ratio = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, output)
     machine_nm[0] = _machine_nm(car, foot, pull, work.rows[lever.way, 0], machine, gives.most_nm)
     if foot.fills and lever.gap_s > 0.0:
@@ -148,6 +165,8 @@ def after_pull(
     if launches:
         target, rate = foot.launch_radps, 1.0
         capacity = launch_nm + car.ways.side[way, 1] * machine_nm[0]
+        if car.body.tyre.slips:
+            capacity = min(capacity, _held_nm(car, work.rows[way, 0], state.speed_mps))
     elif lever.gap_s == 0.0:
         closing = min(closing + step_s / max(car.body.clutch.closing_s, step_s), 1.0)
         rate = 1.0
@@ -158,9 +177,12 @@ def after_pull(
     before = state.speed_mps
     state, out = step(car.body, car.ways, work.rows, state, inputs, pace, work.moving)
     distance += 0.5 * step_s * (before + state.speed_mps)
-    gained = max(_AHEAD * (state.speed_mps - before) / radius, 0.0)
-    after = turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
-    after = after * state.speed_mps / radius + car.ways.side[state.way, 1] * state.side_radps
+    spun = wheel_radps(state.speed_mps, state.spin_radps, car.body) - wheel
+    gained = spun if car.body.tyre.slips else (state.speed_mps - before) / radius
+    gained = max(_AHEAD * gained, 0.0)
+    rate = turning(car.ways.wheel, state.way, state.from_way, state.blend, 1)
+    after = rate * state.speed_mps / radius + rate * state.spin_radps
+    after += car.ways.side[state.way, 1] * state.side_radps
     power = electric_w(machine_nm[0], 0.5 * (machine + after), limits) + limits.auxiliary_w
     energy -= step_s * chemical_power_at(terminal_w(power, limits), energy, car.battery)
     row[SPEED], row[DISTANCE], row[GEAR], row[ENERGY] = state.speed_mps, distance, gear, energy

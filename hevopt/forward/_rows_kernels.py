@@ -71,6 +71,7 @@ class State(NamedTuple):
     """The car at an instant. Units turn as in `way`, and by the share `blend` still as in `from_way`.
 
     lost_nm: what a gearbox with a map has lost in the step before, at its input
+    spin_radps: of the wheels, beyond that of rolling; slip: by which the tyres' force comes, where it does
     """
 
     speed_mps: float
@@ -81,6 +82,8 @@ class State(NamedTuple):
     blend: float
     variant: int
     lost_nm: float = 0.0
+    spin_radps: float = 0.0
+    slip: float = 0.0
 
 
 class Inputs(NamedTuple):
@@ -102,6 +105,19 @@ class Inputs(NamedTuple):
     way: int
     from_way: int
     blend: float
+
+
+class Outputs(NamedTuple):
+    """Means over a step. held_nm: torque at the wheels that keeps a standing car from rolling back."""
+
+    engine_nm: float
+    clutch_nm: float
+    wheel_nm: float
+    brake_nm: float
+    held_nm: float
+    force_n: float
+    road_n: float
+    locked: bool
 
 
 @compiled()
@@ -201,7 +217,7 @@ def settled_rows(ways: Ways) -> Array:
     count, variants = ways.wheel_yield.shape[:2]
     rows = np.empty((count, variants, row_length(ways)))
     for way in range(count):
-        state = State(0.0, 0.0, 0.0, way, way, 0.0, 0, 0.0)
+        state = State(0.0, 0.0, 0.0, way, way, 0.0, 0, 0.0, 0.0, 0.0)
         inputs = Inputs(rows[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, way, way, 0.0)
         for variant in range(variants):
             fill_row(ways, state, inputs, variant, 0.0, 0.0, 0.0, rows[way, variant])

@@ -16,6 +16,7 @@ from hevopt.forward import _breathing_kernels as gas
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.lines import Line
+from hevopt.forward.slipping import slipping
 from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import step_flows
@@ -43,13 +44,14 @@ class Books(Shown):
 class Turning(Shown):
     """Speeds around every step. wheel, side: (step + 1,); units: (unit, step + 1); all rad/s.
 
-    by_wheel: of `units` the part that the wheels turn
+    by_wheel: of `units` the part that the wheels turn; spin: (step + 1,) of the wheels beyond rolling
     """
 
     wheel: Array
     side: Array
     units: Array
     by_wheel: Array
+    spin: Array
 
     @staticmethod
     def mean(values: Array) -> Array:
@@ -64,7 +66,8 @@ def turning_of(
 
     before: as of books_of
     """
-    wheel = np.append(start[0], record[:, col.SPEED]) / radius_m
+    spin = np.append(0.0 if before is None else before[col.SPIN], record[:, col.SPIN])
+    wheel = np.append(start[0], record[:, col.SPEED]) / radius_m + spin
     side = np.append(start[1], record[:, col.SIDE])
     at_start = record[:1, [col.WAY, col.WAY, col.BLEND]] * [1, 1, 0]
     if before is not None:
@@ -75,24 +78,28 @@ def turning_of(
         (rate[way] + blend * (rate[from_way] - rate[way])).T
         for rate in (line.ways.wheel, line.ways.side)
     )
-    return Turning(wheel, side, by_wheel * wheel + by_side * side, by_wheel * wheel)
+    return Turning(wheel, side, by_wheel * wheel + by_side * side, by_wheel * wheel, spin)
 
 
 def books_of(
     car: Architecture, line: Line, record: Array, start: tuple[float, float, float], step_s: float,
-    load_w: Array, breath: Array | None = None, before: Array | None = None,
+    load_w: Array, breath: Array | None = None, before: Array | None = None, slips: bool = False,
 ) -> Books:  # fmt: skip
     """The books of a run; start: the car's speed, the engine side's and stored energy before the first step.
 
     load_w: (step,) electric load
     breath: (step, column) of a mean-value engine, see _breathing_kernels, whose fuel counts
     before: (column,) what the step before the first recorded; None where the car begins in its gear
+    slips: whether the tyres' force came by slip
     """
     turning = turning_of(line, record, start[:2], car.vehicle.tyre_radius_m, before)
     mean = turning.mean
     w, n, units = mean(turning.wheel), mean(turning.side), mean(turning.units)
     inertia = line.ways.inertia_kgm2[:, None] * np.diff(turning.units**2, axis=1) / (2 * step_s)
-    flows = _driven(car, record, w, n, units, inertia, step_s)
+    rolls = w - mean(turning.spin)
+    flows = _driven(car, record, rolls, n, units, inertia, step_s)
+    if slips:
+        flows |= slipping(car, record, turning.wheel, turning.spin, flows["kinetic_w"], step_s)
     flows["auxiliary_power_w"] = load_w
     flows |= _joints(line, record, turning, step_s)
     flows |= _burnt(car, flows, None if breath is None else breath[:, gas.FUEL] / step_s)
@@ -276,7 +283,8 @@ def _residuals(f: Mapping[str, Array]) -> dict[str, Array]:
     return {
         "driveline": engine_w + f["machine_power_w"] + f["held_w"] - inertia_w - lost_w
         - f["wheel_power_w"],
-        "road": f["wheel_power_w"] - f["tyre_lag_w"] - f["road_w"] - f["kinetic_w"],
+        "road": f["wheel_power_w"] - f["tyre_lag_w"] - f.get("tyre_slip_w", 0.0) - f.get("tyre_spring_w", 0.0)
+        - f["road_w"] - f["kinetic_w"],
         "machines": f["machine_electric_w"] - f["machine_power_w"] - f["machine_loss_w"],
         "electric bus": f["battery_power_w"] - f["machine_electric_w"] - f["auxiliary_power_w"]
         - f["starter_electric_w"] - f.get("converter_loss_w", 0.0),

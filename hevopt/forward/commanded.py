@@ -100,6 +100,7 @@ class CommandedCar:
         self.line = line_of(car)
         driver = whole.driver._replace(**_NO_GAINS)
         self._driven = loop_car(car, self.line, whole._replace(driver=driver))
+        self._slips = whole.tyre.slips
         self._work = col.work_of(self._driven.ways)
         self._loads_w = np.array([[car.vehicle.load_w(engine_on=on)] for on in (False, True)])
         self._speed_mps = float(speed_mps)
@@ -193,7 +194,8 @@ class CommandedCar:
         """The books of the steps, and how often the engine was started."""
         phase = record[:, col.PHASE].astype(np.int64)
         load_w = self._loads_w[np.where(phase == motor.REST, 0, 1), 0]
-        books = books_of(self.car, self.line, record, start, self.step_s, load_w, before=before.row)
+        books = books_of(self.car, self.line, record, start, self.step_s, load_w, before=before.row,
+                         slips=self._slips)  # fmt: skip
         if np.isfinite(before.stored_j):  # else a measured map has ended on the way
             times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
             check_charge(self.car, books, times)

@@ -167,6 +167,11 @@ def loop_car(
     car: Architecture, line: Line, handling: Handling, load_w: Array | None = None
 ) -> LoopCar:
     """A car as the compiled loops read it; handling: that of `whole_handling`; load_w: as of a LoopTask."""
+    if handling.tyre.slips and line.free is not None:
+        raise DataError(
+            f"{car.name}: tyres that slip are for an engine behind clutch and gears, or none; leave "
+            'law = "pacejka" out'
+        )
     shifting = handling.shifting or shifting_of(car)
     vehicle, pack = car.vehicle, car.battery
     body = Body(
@@ -182,7 +187,7 @@ def loop_car(
 
 def _floats(part: _Part) -> _Part:
     """One type for the compiled loop, whatever was given."""
-    return type(part)(*map(float, part))
+    return type(part)(*map(float, part))  # type: ignore[arg-type]
 
 
 def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
@@ -224,7 +229,8 @@ def run_of(
     rests = record[:, col.PHASE] == motor.REST
     load_w = task.load_w[np.where(rests, 0, 1), np.minimum(at, task.load_w.shape[1] - 1)]
     start = start_mps, side, float(planned_j[0])
-    books = books_of(car, line, record, start, step_s, load_w, breath)
+    slips = handling.tyre.slips
+    books = books_of(car, line, record, start, step_s, load_w, breath, slips=slips)
     check_charge(car, books, time_s)
     speed = np.append(start_mps, record[:, col.SPEED])
     wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)

@@ -11,9 +11,9 @@ def spectral_radius(driver: DriverGains, tyre: Tyre, step_s: float) -> float:
     """Largest eigenvalue of a step of driver, tyre and car, per mass; the loop is unstable above 1.
 
     States are speed, force, integral and the speed before:  f = -Kp v - Kd (v - v_before)/h + I,  then the tyre's
-    lag and the car of the plant's step.
+    lag and the car of the plant's step; tyres that slip build up their force in a travel, without lag here.
     """
-    pace = pace_of(step_s, tyre.lag_s)
+    pace = pace_of(step_s, 0.0 if tyre.slips else tyre.lag_s)
     given = np.array(
         [-driver.proportional - driver.derivative / step_s, 0.0, 1.0, driver.derivative / step_s]
     )

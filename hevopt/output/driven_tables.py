@@ -32,6 +32,8 @@ SINKS = {
     "converter_loss_w": "converter",
     "brake_power_w": "brakes",
     "tyre_lag_w": "tyre lag",
+    "tyre_slip_w": "tyre slip",
+    "tyre_spring_w": "tyres bent",
     "road_w": "road",
     "auxiliary_power_w": "auxiliaries",
 }
