@@ -19,7 +19,15 @@ from hevopt.forward._pedal_kernels import PedalState
 from hevopt.forward.books import Books, books_of
 from hevopt.forward.drivable import check_geared
 from hevopt.forward.lines import line_of
-from hevopt.forward.run import STEP_S, check_charge, check_step, loop_car, whole_handling
+from hevopt.forward.run import (
+    STEP_S,
+    check_charge,
+    check_step,
+    loop_car,
+    own_loads_w,
+    starts_of,
+    whole_handling,
+)
 from hevopt.problem.arrays import Array
 from hevopt.problem.battery import energy_j, soc
 
@@ -102,7 +110,7 @@ class CommandedCar:
         self._driven = loop_car(car, self.line, whole._replace(driver=driver))
         self._slips = whole.tyre.slips
         self._work = col.work_of(self._driven.ways)
-        self._loads_w = np.array([[car.vehicle.load_w(engine_on=on)] for on in (False, True)])
+        self._loads_w = own_loads_w(car)
         self._speed_mps = float(speed_mps)
         charge = car.soc_start if soc_start is None else float(soc_start)
         low, high = car.battery.soc_min, car.battery.soc_max
@@ -199,7 +207,5 @@ class CommandedCar:
         if np.isfinite(before.stored_j):  # else a measured map has ended on the way
             times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
             check_charge(self.car, books, times)
-        starting = phase == motor.STARTING
-        was = before.row is not None and before.row[col.PHASE] == motor.STARTING
-        starts = int(np.sum(starting[1:] & ~starting[:-1])) + int(starting[0] and not was)
-        return books, starts
+        was = motor.REST if before.row is None else int(before.row[col.PHASE])
+        return books, starts_of(phase, was)

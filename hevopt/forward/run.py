@@ -212,8 +212,18 @@ def _loads_w(car: Architecture, cycle: Cycle) -> Array:
     """(2, time) electric load while the engine is at rest and while it turns: the cycle's, or the car's own."""
     if cycle.auxiliary_w is not None:
         return np.array([cycle.auxiliary_w[:-1]] * 2, dtype=np.float64)
-    own = [[car.vehicle.load_w(engine_on=on)] for on in (False, True)]
-    return np.repeat(np.array(own, dtype=np.float64), len(cycle.time_s) - 1, axis=1)
+    return np.repeat(own_loads_w(car), len(cycle.time_s) - 1, axis=1)
+
+
+def own_loads_w(car: Architecture) -> Array:
+    """(2, 1) electric load of the car's file while the engine is at rest and while it turns."""
+    return np.array([[car.vehicle.load_w(engine_on=on)] for on in (False, True)], dtype=np.float64)
+
+
+def starts_of(phase: Indices, before: int) -> int:
+    """How often the engine was started; phase: (step,) of the engine; before: that of the step before the first."""
+    starting = np.append(before, phase) == motor.STARTING
+    return int(np.sum(starting[1:] & ~starting[:-1]))
 
 
 def run_of(
@@ -235,8 +245,7 @@ def run_of(
     speed = np.append(start_mps, record[:, col.SPEED])
     wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)
     phase = record[:, col.PHASE].astype(np.int64)
-    starts = int(np.sum((phase[1:] == motor.STARTING) & (phase[:-1] != motor.STARTING)))
-    starts += int(phase[0] == motor.STARTING)
+    starts = starts_of(phase, motor.REST)
     return ForwardRun(
         car, cycle, step_s, handling, time_s, speed, wanted,
         line.gears[record[:, col.WAY].astype(np.int64)], phase, record[:, col.FULL] > 0, books,

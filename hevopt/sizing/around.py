@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import product
 from math import prod
 
-from hevopt.sizing.candidates import Candidate, Candidates, Fate
+from hevopt.sizing.candidates import Candidate, Candidates, least_bound, rank
 from hevopt.sizing.search import levels_of, rounded
 from hevopt.sizing.study_file import SizeStudy
 from hevopt.sweeps.plan.parameters import Range, Scalar, Values
@@ -40,18 +40,13 @@ def around(study: SizeStudy, candidates: Candidates) -> Lattice | None:
     """Judge the lattice around the best design so far; None where no design meets what is asked."""
     found = None
     for _ in range(_MOVES):
-        best = _best(candidates)
+        best = min(candidates.solved, key=rank, default=None)
         if best is None:
             return None
         found = _judged(study, candidates, best)
-        if _best(candidates) is best:
+        if min(candidates.solved, key=rank) is best:
             break
     return found
-
-
-def _best(candidates: Candidates) -> Candidate | None:
-    solved = candidates.solved
-    return min(solved, key=lambda one: (one.values or (), one.design.number), default=None)
 
 
 def _judged(study: SizeStudy, candidates: Candidates, best: Candidate) -> Lattice:
@@ -68,10 +63,7 @@ def _judged(study: SizeStudy, candidates: Candidates, best: Candidate) -> Lattic
     judged = candidates.judged([
         {key: point.get(key, held.get(key, 0.0)) for key in study.sweep.parameters} for point in points
     ])  # fmt: skip
-    asked = [one for one in judged if one.fate in (Fate.SOLVED, Fate.DISCARDED)]
-    bounds = [one.bounds[0] for one in asked if one.bounds is not None]
-    least = min(bounds) if bounds and len(bounds) == len(asked) else None
-    return Lattice(values, held, len(points), least)
+    return Lattice(values, held, len(points), least_bound(judged))
 
 
 def beside(allowed: Values, value: Scalar) -> tuple[Scalar, ...]:

@@ -62,6 +62,19 @@ class Candidate:
         return fsum(max(one.excess, 0.0) for one in self.required)
 
 
+def rank(one: Candidate) -> tuple[tuple[float, ...], int]:
+    """By which solved designs are ordered: the first objective's least first."""
+    return one.values or (), one.design.number
+
+
+def least_bound(found: Iterable[Candidate]) -> float | None:
+    """What none of some designs that meet what is asked can be below in the first objective: their least bound.
+    None where one has none."""
+    asked = [one for one in found if one.fate in (Fate.SOLVED, Fate.DISCARDED)]
+    bounds = [one.bounds[0] for one in asked if one.bounds is not None]
+    return min(bounds) if bounds and len(bounds) == len(asked) else None
+
+
 # Runs those cases of some jobs, by their keys, that the store lacks.
 Runner = Callable[[Sequence[Job], Iterable[str]], None]
 

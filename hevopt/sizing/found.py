@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hevopt.display.facts import Shown
 from hevopt.sizing.around import Lattice
-from hevopt.sizing.candidates import Candidate, Fate
+from hevopt.sizing.candidates import Candidate, Fate, least_bound, rank
 from hevopt.sizing.proof.prove import RangeProof
 from hevopt.sizing.study_file import SizeStudy
 
@@ -47,9 +47,8 @@ class Sizing(Shown):
     @property
     def front(self) -> list[Candidate]:
         """Designs that no other one is as good as in every objective, the first objective's least first."""
-        ordered = sorted(self.solved, key=lambda one: (one.values or (), one.design.number))
         kept: list[Candidate] = []
-        for one in ordered:
+        for one in sorted(self.solved, key=rank):
             values = one.values or ()
             if not any(
                 all(a <= b for a, b in zip(k.values or (), values, strict=True)) for k in kept
@@ -65,9 +64,7 @@ class Sizing(Shown):
     @property
     def least(self) -> float | None:
         """What no design judged can be below in the first objective: the least bound. None where one has none."""
-        judged = [one for one in self.found if one.fate in (Fate.SOLVED, Fate.DISCARDED)]
-        bounds = [one.bounds[0] for one in judged if one.bounds is not None]
-        return min(bounds) if bounds and len(bounds) == len(judged) else None
+        return least_bound(self.found)
 
     @property
     def proven(self) -> float | None:
