@@ -25,24 +25,34 @@ def interpolated(
 
     grid_speed_radps: (speed,), grid_torque_nm: (torque,), values: (speed, torque), NaN where not measured
     """
-    speed, torque = np.broadcast_arrays(speed_radps, torque_nm)
-    i, x = _place(grid_speed_radps, speed)
-    j, y = _place(grid_torque_nm, torque)
-    corners: tuple[tuple[Array, Array], ...] = (
-        (values[i, j], (1 - x) * (1 - y)),
-        (values[i, j + 1], (1 - x) * y),
-        (values[i + 1, j], x * (1 - y)),
-        (values[i + 1, j + 1], x * y),
-    )
-    result = np.zeros(speed.shape)
-    for corner, weight in corners:
-        # A corner that was not measured spoils only what leans on it.
+    i, x = _place(grid_speed_radps, np.asarray(speed_radps))
+    j, y = _place(grid_torque_nm, np.asarray(torque_nm))
+    known, row = ~np.isnan(values), values.shape[1]
+    filled, first = np.where(known, values, 0.0).ravel(), i * row + j
+    below, above = 1 - y, y
+    result = np.asarray(filled[first] * ((1 - x) * below))
+    result += filled[first + 1] * ((1 - x) * above)
+    result += filled[first + row] * (x * below)
+    result += filled[first + row + 1] * (x * above)
+    whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:]
+    if not whole.all():
+        beside = ~whole[i, j]
+        i, j, x, y = np.broadcast_arrays(i, j, x, y)
+        result[beside] = _beside_holes(values, i[beside], j[beside], x[beside], y[beside])
+    result[_beyond(x) | _beyond(y)] = np.nan
+    return result
+
+
+def _beside_holes(
+    values: Array, i: NDArray[np.int64], j: NDArray[np.int64], x: Array, y: Array
+) -> Array:
+    """The quantity in cells with a corner that was not measured, which spoils only what leans on it."""
+    corners = values[i, j], values[i, j + 1], values[i + 1, j], values[i + 1, j + 1]
+    weights = (1 - x) * (1 - y), (1 - x) * y, x * (1 - y), x * y
+    result = np.zeros(x.shape)
+    for corner, weight in zip(corners, weights, strict=True):
         result += np.where(weight == 0, 0.0, weight * corner)
-    if np.isnan(values).any():
-        result = np.where(
-            np.isnan(result), _on_triangle([corner for corner, _ in corners], x, y), result
-        )
-    return np.where(_beyond(x) | _beyond(y), np.nan, result)
+    return np.where(np.isnan(result), _on_triangle(corners, x, y), result)
 
 
 def along(axis: Array, values: Array, at: Array) -> Array:

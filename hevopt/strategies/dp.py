@@ -12,12 +12,13 @@ misled it, and steep prices with all choices follow; where they cannot keep thei
 few steps' energy, once more on finer grids.
 
 The first grid spans the SOC window; the next ones ever narrower bands around the path found. A quick look comes
-before where a gap that is enough is told: a coarse grid over the window and one band. Where a bound proves that
-its path keeps to that gap, as it does for most cars, there is no other grid.
+before where a gap that is enough is told: a coarse grid over the window and one band, and where a bound does not
+prove that its path keeps to that gap, one band more. Where it does then, as for most cars, there is no other grid.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -39,8 +40,8 @@ ENERGY_NODES = 1001
 # Widths of the grids as shares of the SOC window; finer ones are tried while they gain this share of cost.
 _BANDS = (1.0, 0.1, 0.01, 0.003, 0.001)
 _GAIN_WORTH_MORE = 2e-5
-# The grids of a quick look, as shares of window and nodes.
-_QUICK = ((1.0, 0.25), (0.1, 1.0))
+# The grids of a quick look, as shares of window and nodes; the path is tried from the second on.
+_QUICK = ((1.0, 0.25), (0.1, 1.0), (0.01, 1.0))
 # Missing charge costs this many times what it is worth.
 _GENTLE, _STEEP = 5.0, 1e4
 # A rollout dearer than promised by this share has been misled.
@@ -85,16 +86,18 @@ def solve(
     notes = {"price_kgpj": price, "nodes": nodes}
     if enough_gap > 0:
         grids = [(band, max(int(share * nodes), 3)) for band, share in _QUICK]
-        cost, control, _ = _search(gentle, grids)
-        if _proven_gap(problem, control, cost, price) <= enough_gap:
-            return Plan(control, notes)
+        for cost, control, _ in islice(_search(gentle, grids), 1, None):
+            if _proven_gap(problem, control, cost, price) <= enough_gap:
+                return Plan(control, notes)
     bands = _BANDS if refine else _BANDS[:1]
-    cost, control, promised = _search(gentle, [(band, nodes) for band in bands])
+    *_, (cost, control, promised) = _search(gentle, [(band, nodes) for band in bands])
     steep = _Setting(problem, every, every, reach, _STEEP * worth, hard_top=True)
     for finer in (nodes, min(_FINER * nodes, _NODES_MAX)):
         if cost - promised <= _PROMISE_TOLERANCE * abs(cost):
             break
-        steep_cost, steep_control, promised = _search(steep, [(band, finer) for band in bands])
+        *_, (steep_cost, steep_control, promised) = _search(
+            steep, [(band, finer) for band in bands]
+        )
         if steep_cost < cost:
             cost, control = steep_cost, steep_control
     return Plan(control, notes)
@@ -109,8 +112,10 @@ def _proven_gap(problem: Problem, control: Indices, cost_kg: float, price: float
     return (cost_kg - bound_kg) / max(abs(cost_kg), TINY)
 
 
-def _search(setting: _Setting, grids: Sequence[tuple[float, int]]) -> tuple[float, Indices, float]:
-    """Cost and controls of the best path over all grids, and what the first grid promised.
+def _search(
+    setting: _Setting, grids: Sequence[tuple[float, int]]
+) -> Iterator[tuple[float, Indices, float]]:
+    """After every grid: cost and controls of the best path so far, and what the first grid promised.
 
     grids: width as a share of the SOC window, and number of nodes
     """
@@ -130,9 +135,9 @@ def _search(setting: _Setting, grids: Sequence[tuple[float, int]]) -> tuple[floa
         if cost < best_cost:
             best_cost, best, centre = cost, choices.control[path], energy_j
             switch_j = switched(problem.table, problem.start_mode, best).energy_j
+        yield best_cost, best, promises[0]
         if settled:
             break
-    return best_cost, best, promises[0]
 
 
 def _grid_around(problem: Problem, centre_j: Array, cell_j: float, nodes: int) -> Grid:

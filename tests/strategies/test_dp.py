@@ -153,16 +153,23 @@ def test_fuel_converges_with_energy_nodes_and_torque_levels(problem_of):
 @pytest.mark.parametrize("name", ["B", "C2", "D"])
 def test_a_quick_look_is_taken_only_where_it_is_proven_to_be_enough(problem_of, name, monkeypatch):
     problem = problem_of(name, "hwfet")
-    whole, grids = simulate(problem, dp.solve(problem).control), []
-    search = dp._search
-    monkeypatch.setattr(dp, "_search", lambda *args: grids.append(len(args[1])) or search(*args))
-    for gap, searches in ((5e-4, [2]), (1e-12, [2, len(dp._BANDS)])):
+    whole, grids, gaps = simulate(problem, dp.solve(problem).control), [], []
+    on_grid, proven_gap = dp._solve_on_grid, dp._proven_gap
+    monkeypatch.setattr(dp, "_solve_on_grid", lambda *args: grids.append(args[3]) or on_grid(*args))
+    monkeypatch.setattr(dp, "_proven_gap", lambda *args: gaps.append(proven_gap(*args)) or gaps[-1])
+
+    def looked(gap: float) -> int:
         grids.clear()
         quick = simulate(problem, dp.solve(problem, enough_gap=gap).control)
-        assert grids == searches
         bound_kg, _ = certify(problem, quick).bound_of(quick)
         assert quick.cost_kg - bound_kg <= max(gap, 5e-4) * quick.cost_kg
         assert quick.cost_kg <= whole.cost_kg * (1 + gap)
+        return len(grids)
+
+    assert looked(1e-12) > len(dp._QUICK) and len(gaps) == 2
+    first, second = gaps
+    assert second < first and looked((first + second) / 2) == 3
+    assert looked(first) == 2 and grids[0] < grids[1]
 
 
 def test_order_of_controls_does_not_matter():
