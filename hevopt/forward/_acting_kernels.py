@@ -9,6 +9,14 @@ from hevopt._compile import compiled
 from hevopt.car.handling import DriverGains, Shifting
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
+from hevopt.forward._beside_kernels import (
+    Acts,
+    Beside,
+    beside_w,
+    first_range,
+    set_beside,
+    unit_radps,
+)
 from hevopt.forward._contact_kernels import Body, wheel_radps
 from hevopt.forward._lever_kernels import (
     Lever,
@@ -23,6 +31,7 @@ from hevopt.forward._share_kernels import (
     Shared,
     following_nm,
     machine_range,
+    meets_of,
     shared,
 )
 from hevopt.problem._battery_kernels import BatteryArrays
@@ -34,13 +43,14 @@ _FEEDBACK_SPEED_RADPS = 50.0
 
 
 class LoopCar(NamedTuple):
-    """All that the loop knows of a car."""
+    """All that the loop knows of a car; limits: of its first machine, beside: of the others."""
 
     body: Body
     ways: Ways
     fast_way: NDArray[np.int64]
     fast_radps: Array
     limits: Limits
+    beside: Beside
     battery: BatteryArrays
     window_j: tuple[float, float]
     shifting: Shifting
@@ -51,8 +61,9 @@ class LoopTask(NamedTuple):
     """A trace, and a plan for it of which every step holds from one of its times to the next.
 
     time_s, speed_mps: (time + 1,); slope_rad: (time,); load_w: (2, time) electric load, engine at rest and not
-    from_s, energy_j: (step + 1,); way, engine_on, apart, machine_nm: (step,)
+    from_s, energy_j: (step + 1,); way, engine_on, apart, machine_nm: (step,); others_nm: (step, machine - 1)
     energy_j: what the plan has stored; apart: the clutch is open while the car is braked, or no gear is in
+    machine_nm, others_nm: of the first machine of a Line, and of those beside it
     """
 
     time_s: Array
@@ -65,6 +76,7 @@ class LoopTask(NamedTuple):
     apart: NDArray[np.int64]
     machine_nm: Array
     energy_j: Array
+    others_nm: Array
 
 
 class Now(NamedTuple):
@@ -183,19 +195,42 @@ def friction_nm(car: LoopCar, wheel_nm: float, speed_mps: float) -> float:
     return -wheel_nm * (1.0 - share_of_braking(speed_mps, rate, car.limits))
 
 
+@compiled()
+def _beside_set(
+    car: LoopCar, row: Array, now: Now, state: State, asked: AskedStep, joint: motor.Joined, lever: Lever,
+    load_w: float, machine_nm: Array,
+) -> AskedStep:  # fmt: skip
+    """What is asked, the first machine's limits as the others leave them; machine_nm: theirs, set."""
+    closed = joint.closing > 0.0
+    bare = meets_of(row, asked.accel, asked.lost_nm, closed, machine_nm[:1])
+    left = asked.wheel_nm - bare.c0 - bare.ce * asked.least_nm
+    acts = Acts(left, asked.braking, closed, joint.launches, joint.phase == motor.TURNING,
+                now.energy_j < car.window_j[1], now.energy_j > car.window_j[0])  # fmt: skip
+    wheel, side = wheel_radps(state.speed_mps, state.spin_radps, car.body), state.side_radps
+    set_beside(car.beside, row, car.ways, lever, wheel, side, acts, machine_nm)
+    others = beside_w(car.beside, car.ways, lever, wheel, side, machine_nm) + load_w
+    speed = unit_radps(car.ways, lever, 1, wheel, side)
+    low, high = first_range(car.beside, asked.low_nm, asked.high_nm, speed, others, car.limits)
+    return AskedStep(asked.wheel_nm, asked.accel, min(max(asked.set_nm, low), high), low, high, asked.least_nm,
+                     asked.most_nm, asked.braking, asked.lost_nm)  # fmt: skip
+
+
 @compiled(inline="always")
 def split_of(
     car: LoopCar,
     rows: Array,
+    now: Now,
     state: State,
     asked: AskedStep,
     joint: motor.Joined,
     lever: Lever,
+    load_w: float,
     machine_nm: Array,
     step_s: float,
 ) -> Shared:
     """Torques of engine, machine and brakes, and what the clutch has to pass.
 
+    machine_nm: of machines beside the first the set-points, of which the torques are made
     A machine whose gear changes brings its own rotor along; between gears it does nothing else, while a ratio that
     moves under load passes the rest as well.
     """
@@ -214,6 +249,10 @@ def split_of(
     asked = AskedStep(asked.wheel_nm + friction, asked.accel, asked.set_nm, asked.low_nm, asked.high_nm,
                   asked.least_nm, asked.most_nm, asked.braking, asked.lost_nm)  # fmt: skip
     closed = joint.closing > 0.0
+    if len(machine_nm) > 1:
+        asked = _beside_set(
+            car, rows[lever.way, state.variant], now, state, asked, joint, lever, load_w, machine_nm
+        )
     split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
                    joint.launches, machine_nm)  # fmt: skip
     given = pace if cut else split.machine_nm

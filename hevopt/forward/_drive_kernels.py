@@ -21,12 +21,13 @@ from hevopt.forward._acting_kernels import (
     is_called,
     split_of,
 )
+from hevopt.forward._beside_kernels import beside_w
 from hevopt.forward._contact_kernels import Pace, pace_of, wheel_radps
 from hevopt.forward._lever_kernels import Lever, changed, resting_lever
 from hevopt.forward._limits_kernels import Gives, by_map, electric_w, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
-from hevopt.forward._rows_kernels import State, Ways, row_length, settled_rows, turning
+from hevopt.forward._rows_kernels import Outputs, State, Ways, row_length, settled_rows, turning
 from hevopt.forward._share_kernels import pace_nm
 from hevopt.problem._battery_kernels import chemical_power_at
 
@@ -124,6 +125,35 @@ def step_at(time_s: Array, at_s: float, k: int) -> int:
     return k
 
 
+@compiled()
+def energy_after(
+    car: LoopCar, energy_j: float, power_w: float, phase: int, out: Outputs, mean_side: float, step_s: float
+) -> float:  # fmt: skip
+    """Stored energy after a step with a power of machines and loads, and of a starter that turns the engine."""
+    if phase == motor.STARTING:
+        power_w += max(out.engine_nm * mean_side, 0.0) / car.limits.spin_efficiency
+    terminal = terminal_w(power_w, car.limits)
+    return float(energy_j - step_s * chemical_power_at(terminal, energy_j, car.battery))
+
+
+@compiled()
+def record_step(
+    row: Array, state: State, pedal: PedalState, energy_j: float, phase: int, cause: int, full: bool,
+    out: Outputs, machine_nm: Array,
+) -> None:  # fmt: skip
+    """A step's columns: the car after it, and what acted in it."""
+    row[SPEED], row[FORCE], row[SIDE] = state.speed_mps, state.force_n, state.side_radps
+    row[WAY], row[FROM_WAY], row[BLEND] = state.way, state.from_way, state.blend
+    row[ENERGY], row[ENGINE], row[MACHINE] = energy_j, out.engine_nm, machine_nm[0]
+    row[CLUTCH], row[WHEEL], row[BRAKE] = out.clutch_nm, out.wheel_nm, out.brake_nm
+    row[HELD], row[TYRE], row[ROAD] = out.held_nm, out.force_n, out.road_n
+    row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, cause
+    row[FULL], row[VARIANT] = 1.0 if full else 0.0, state.variant
+    row[LOST], row[SPIN], row[SLIP] = state.lost_nm, state.spin_radps, state.slip
+    for m in range(1, len(machine_nm)):
+        row[COLUMNS + m - 1] = machine_nm[m]
+
+
 @compiled(inline="always")
 def after_step(
     car: LoopCar, task: LoopTask, work: Work, loop: Loop, place: Place, gives: Gives, pace: Pace, row: Array
@@ -153,7 +183,10 @@ def after_step(
     need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9) + state.lost_nm
     joint = motor.joined(joint, phase, lever.gap_s > 0.0 or begins, neutral, wish.braking,
                          ratio * wheel, need, car.limits, car.body.clutch, step_s)  # fmt: skip
-    given = split_of(car, rows, state, wish, joint, lever, machine_nm, step_s)
+    load_w = task.load_w[0 if phase == motor.REST else 1, k]
+    for m in range(1, len(machine_nm)):
+        machine_nm[m] = task.others_nm[d, m - 1]
+    given = split_of(car, rows, now, state, wish, joint, lever, load_w, machine_nm, step_s)
     machine_nm[0] = given.machine_nm
     inputs = inputs_of(car, state, pedal, joint, lever, given, gives, slope, machine_nm, step_s)
     state, out = step(car.body, car.ways, rows, state, inputs, pace, work.moving)
@@ -161,23 +194,16 @@ def after_step(
     mean = 0.5 * (machine + rate * state.speed_mps / car.body.radius_m + rate * state.spin_radps
                   + car.ways.side[state.way, 1] * state.side_radps)  # fmt: skip
     power = electric_w(given.machine_nm, mean, car.limits)
-    power += task.load_w[0 if phase == motor.REST else 1, k]
-    if phase == motor.STARTING:
-        mean_n = 0.5 * (now.side_radps + state.side_radps)
-        power += max(out.engine_nm * mean_n, 0.0) / car.limits.spin_efficiency
-    energy -= step_s * chemical_power_at(terminal_w(power, car.limits), energy, car.battery)
+    mean_n = 0.5 * (now.side_radps + state.side_radps)
+    if len(machine_nm) > 1:
+        mean_w = 0.5 * (wheel + wheel_radps(state.speed_mps, state.spin_radps, car.body))
+        power += beside_w(car.beside, car.ways, lever, mean_w, mean_n, machine_nm)
+    energy = energy_after(car, energy, power + load_w, phase, out, mean_n, step_s)
     stuck = phase == motor.TURNING and joint.closing == 0.0 and not joint.launches
     stuck = stuck or lever.gap_s > 0.0
     pedal = remembered(pedal, (stuck and not wish.braking) or (given.full and
                        pedal.error_mps > 0.0), car.body, car.driver, step_s)  # fmt: skip
-    row[SPEED], row[FORCE], row[SIDE] = state.speed_mps, state.force_n, state.side_radps
-    row[WAY], row[FROM_WAY], row[BLEND] = state.way, state.from_way, state.blend
-    row[ENERGY], row[ENGINE], row[MACHINE] = energy, out.engine_nm, given.machine_nm
-    row[CLUTCH], row[WHEEL], row[BRAKE] = out.clutch_nm, out.wheel_nm, out.brake_nm
-    row[HELD], row[TYRE], row[ROAD] = out.held_nm, out.force_n, out.road_n
-    row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, joint.cause
-    row[FULL], row[VARIANT] = 1.0 if given.full else 0.0, state.variant
-    row[LOST], row[SPIN], row[SLIP] = state.lost_nm, state.spin_radps, state.slip
+    record_step(row, state, pedal, energy, phase, joint.cause, given.full, out, machine_nm)
     return Loop(state, pedal, lever, joint, energy, ahead), given.wanted_nm
 
 

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt._compile import compiled
-from hevopt.forward import _drive_kernels as loop_col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._acting_kernels import LoopTask, Now, friction_nm, is_called
 from hevopt.forward._contact_kernels import Pace, clutch_capacity_nm, pace_of
-from hevopt.forward._drive_kernels import Place, Work, place_of
+from hevopt.forward._drive_kernels import Place, Work, energy_after, place_of, record_step
 from hevopt.forward._free_kernels import (
     Allotted,
     FreeCar,
@@ -25,11 +24,10 @@ from hevopt.forward._free_kernels import (
     may_not_rest,
     side_after,
 )
-from hevopt.forward._limits_kernels import by_map, limit_nm, terminal_w
+from hevopt.forward._limits_kernels import by_map, limit_nm
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State
-from hevopt.problem._battery_kernels import chemical_power_at
 
 _CLOSED_SLIP_RADPS = 1.0
 _FEEDBACK_SPEED_RADPS = 50.0
@@ -205,24 +203,6 @@ def _stepped(
 
 
 @compiled()
-def _record(row: Array, loop: FreeLoop, out: Outputs, machine_nm: Array, full: bool) -> None:
-    """A step's columns: the loop after it, and what acted in it."""
-    state = loop.state
-    row[loop_col.SPEED], row[loop_col.FORCE] = state.speed_mps, state.force_n
-    row[loop_col.SIDE], row[loop_col.ENERGY] = state.side_radps, loop.energy_j
-    row[loop_col.WAY] = row[loop_col.FROM_WAY] = state.way
-    row[loop_col.ENGINE], row[loop_col.MACHINE] = out.engine_nm, machine_nm[0]
-    row[loop_col.CLUTCH], row[loop_col.WHEEL] = out.clutch_nm, out.wheel_nm
-    row[loop_col.BRAKE], row[loop_col.HELD] = out.brake_nm, out.held_nm
-    row[loop_col.TYRE], row[loop_col.ROAD] = out.force_n, out.road_n
-    row[loop_col.ASKED], row[loop_col.PHASE] = loop.pedal.force_n, loop.phase
-    row[loop_col.CAUSE] = motor.CHANGE if loop.closing > 0.0 else motor.NONE
-    row[loop_col.FULL], row[loop_col.VARIANT] = 1.0 if full else 0.0, state.variant
-    for m in range(1, len(machine_nm)):
-        row[loop_col.COLUMNS + m - 1] = machine_nm[m]
-
-
-@compiled()
 def after_step(
     car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, speeds: Array, loop: FreeLoop, place: Place,
     pace: Pace, row: Array,
@@ -254,11 +234,10 @@ def after_step(
     mean_side = 0.5 * (before + state.side_radps)
     _speeds(car, state.way, 0.5 * (wheel + state.speed_mps / body.radius_m), mean_side, speeds)
     power = bus_w(car, machine_nm, speeds) + task.load_w[0 if phase == motor.REST else 1, k]
-    if phase == motor.STARTING:
-        power += max(out.engine_nm * mean_side, 0.0) / limits.spin_efficiency
-    energy -= step_s * chemical_power_at(terminal_w(power, limits), energy, car.loop.battery)
+    energy = energy_after(car.loop, energy, power, phase, out, mean_side, step_s)
     pedal = remembered(pedal, given.full and pedal.error_mps > 0.0, body, driver, step_s)
-    _record(row, FreeLoop(state, pedal, phase, closing, energy, ahead), out, machine_nm, given.full)
+    cause = motor.CHANGE if closing > 0.0 else motor.NONE
+    record_step(row, state, pedal, energy, phase, cause, given.full, out, machine_nm)
     return FreeLoop(state, pedal, phase, closing, energy, ahead)
 
 

@@ -16,31 +16,13 @@ import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.forward._contact_kernels import Body, Pace, grip_n, resistance
-from hevopt.forward._rows_kernels import (
-    Array,
-    Inputs,
-    Outputs,
-    State,
-    Ways,
-    fill_row,
-    lost_nm,
-    turning,
-)
+from hevopt.forward._round_kernels import SETTLED, found_of, row_of
+from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State, Ways, turning
 from hevopt.forward._slip_kernels import slip_step
-from hevopt.forward._solve_kernels import (
-    Motion,
-    SolvedStep,
-    directions,
-    joint_torque_nm,
-    reached,
-    solve,
-    sums,
-)
+from hevopt.forward._solve_kernels import Motion, SolvedStep, reached, solve, sums
 
 # Rounds of guessing the directions of power, each flipping those that proved wrong, and what a map says is lost.
 _ROUNDS = 12
-# Share of a speed within which a moving ratio is settled, and of a torque within which a map's loss is.
-_SETTLED = 1e-13
 
 
 @compiled()
@@ -70,16 +52,14 @@ def step(
     slip = state.side_radps - ratio * wheel
     moving = state.blend > 0.0 or inputs.blend > 0.0 or state.way != inputs.way
 
-    variant, joints = state.variant, ways.load.shape[2]
+    variant = state.variant
     guess_wheel, guess_side, guess_nm = 0.0, 0.0, state.lost_nm
     rest = motion
     for _ in range(_ROUNDS):
         lost = guess_nm
-        if moving:
-            fill_row(ways, state, inputs, variant, wheel, wheel + guess_wheel,
-                     state.side_radps + guess_side, row)  # fmt: skip
-        else:
-            row = rows[inputs.way, variant]
+        row = row_of(
+            ways, rows, state, inputs, variant, moving, wheel, guess_wheel, guess_side, row
+        )
         s = sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s, lost)
         solved = solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                         inputs.capacity_nm)  # fmt: skip
@@ -91,17 +71,13 @@ def step(
             solved = SolvedStep(rest.rest, *solved[1:])
             if free.wheel > top and reached(s, motion, solved) < motion.own * top:
                 solved = free
-        found = directions(
-            row, joints, variant, inputs.machine_nm, solved, wheel + 0.5 * solved.wheel,
-            state.side_radps + 0.5 * solved.side, per_s, lost,
-        )  # fmt: skip
-        if ways.lost.loss_nm.size > 0:
-            through = joint_torque_nm(row, ways.lost.joint, inputs.machine_nm, solved, per_s, 0.0)
-            guess_nm = lost_nm(ways.lost, inputs.way, ratio * (wheel + 0.5 * solved.wheel), through)
-        still = abs(solved.wheel - guess_wheel) <= _SETTLED * wheel
-        still &= abs(solved.side - guess_side) <= _SETTLED * state.side_radps
+        found, guess_nm = found_of(
+            ways, row, state, inputs, variant, solved, ratio, wheel, per_s, lost
+        )
+        still = abs(solved.wheel - guess_wheel) <= SETTLED * wheel
+        still &= abs(solved.side - guess_side) <= SETTLED * state.side_radps
         still |= not moving
-        if found == variant and still and abs(guess_nm - lost) <= _SETTLED * max(lost, 1.0):
+        if found == variant and still and abs(guess_nm - lost) <= SETTLED * max(lost, 1.0):
             break
         variant, guess_wheel, guess_side = found, solved.wheel, solved.side
 

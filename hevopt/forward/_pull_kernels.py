@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from hevopt._compile import compiled
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._acting_kernels import LoopCar
+from hevopt.forward._beside_kernels import beside_w, floor_beside
 from hevopt.forward._contact_kernels import (
     Pace,
     clutch_capacity_nm,
@@ -71,7 +72,7 @@ class Pull(NamedTuple):
 
 
 class PullWork(NamedTuple):
-    """What the loop works with: settled_rows of the ways, space for a row of a moving one, and for a torque."""
+    """What the loop works with: settled_rows of the ways, space for a row of a moving one, and for torques."""
 
     rows: Array
     moving: Array
@@ -81,7 +82,8 @@ class PullWork(NamedTuple):
 @compiled()
 def pull_work(car: LoopCar) -> PullWork:
     """Room for the loop's work."""
-    return PullWork(settled_rows(car.ways), np.empty(row_length(car.ways)), np.zeros(1))
+    machines = len(car.ways.inertia_kgm2) - 2
+    return PullWork(settled_rows(car.ways), np.empty(row_length(car.ways)), np.zeros(machines))
 
 
 @compiled()
@@ -157,6 +159,12 @@ def after_pull(
         machine_nm[0] = 0.0
     if moves_machine(car.ways, lever) and lever.gap_s > 0.0:
         machine_nm[0] = keeping_pace_nm(car.ways, state, lever, wheel, step_s)
+    on_side = car.ways.side[way, 1] * machine_nm[0]
+    if len(machine_nm) > 1:
+        helps = foot.boosts and not foot.fills and energy > car.window_j[0]
+        floor_beside(car.beside, car.ways, lever, wheel, n, limits, helps, machine_nm)
+        for m in range(1, len(machine_nm)):
+            on_side += car.ways.side[way, m + 1] * machine_nm[m]
     if launches and car.ways.wheel[by_gear[0], output] * wheel >= foot.launch_radps:
         launches, closing = False, 1.0
     # As fast as the gears will be, and no slower: a clutch that is overtaken within a step passes nothing.
@@ -164,7 +172,7 @@ def after_pull(
     rate = 1.0 - np.exp(-step_s / car.driver.governor_s)
     if launches:
         target, rate = foot.launch_radps, 1.0
-        capacity = launch_nm + car.ways.side[way, 1] * machine_nm[0]
+        capacity = launch_nm + on_side
         if car.body.tyre.slips:
             capacity = min(capacity, _held_nm(car, work.rows[way, 0], state.speed_mps))
     elif lever.gap_s == 0.0:
@@ -184,6 +192,9 @@ def after_pull(
     after = rate * state.speed_mps / radius + rate * state.spin_radps
     after += car.ways.side[state.way, 1] * state.side_radps
     power = electric_w(machine_nm[0], 0.5 * (machine + after), limits) + limits.auxiliary_w
+    if len(machine_nm) > 1:
+        power += beside_w(car.beside, car.ways, lever, wheel + 0.5 * spun, 0.5 * (n + state.side_radps),
+                          machine_nm)  # fmt: skip
     energy -= step_s * chemical_power_at(terminal_w(power, limits), energy, car.battery)
     row[SPEED], row[DISTANCE], row[GEAR], row[ENERGY] = state.speed_mps, distance, gear, energy
     row[SIDE], row[FORCE], row[MACHINE] = state.side_radps, out.force_n, machine_nm[0]

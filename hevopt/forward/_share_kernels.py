@@ -3,7 +3,8 @@
 What reaches the wheels is linear in both torques,  T = c0 + ce T_engine + cm T_machine,  with the row of the way
 driven and the acceleration asked for. With the clutch closed the machine has its set-point and the engine the rest,
 within its limits; what is beyond them falls to the machine, as far as the car's functions let it. With the clutch
-open or the engine at rest the machine has it all.
+open or the engine at rest the machine has it all. Machines beside the first have their torques before
+(_beside_kernels).
 """
 
 from typing import NamedTuple
@@ -52,25 +53,38 @@ class AskedStep(NamedTuple):
 
 
 class Meets(NamedTuple):
-    """T = c0 + ce T_engine + cm T_machine at the wheels."""
+    """T = c0 + ce T_engine + cm T_machine at the wheels; on_side: of machines beside the first, at the engine's."""
 
     c0: float
     ce: float
     cm: float
+    on_side: float
 
 
 @compiled()
-def _meets(row: Array, accel: float, lost_nm: float, closed: bool) -> Meets:
-    taken = row[col.CLUTCH] * lost_nm
+def _others(row: Array, machine_nm: Array) -> tuple[float, float]:
+    """What machines beside the first bring to wheels and engine's side."""
+    wheel, side = 0.0, 0.0
+    for m in range(1, len(machine_nm)):
+        wheel += row[col.MACHINES + col.PER_MACHINE * m] * machine_nm[m]
+        side += row[col.MACHINES + col.PER_MACHINE * m + 1] * machine_nm[m]
+    return wheel, side
+
+
+@compiled()
+def meets_of(row: Array, accel: float, lost_nm: float, closed: bool, machine_nm: Array) -> Meets:
+    """What reaches the wheels at an acceleration, with the torques of machines beside the first."""
+    taken, (others, on_side) = row[col.CLUTCH] * lost_nm, _others(row, machine_nm)
     wheel_m, side_m = row[col.MACHINES], row[col.MACHINES + 1]
     if not closed:
-        return Meets(-row[col.PER_W] * accel - taken, 0.0, wheel_m)
+        return Meets(-row[col.PER_W] * accel - taken + others, 0.0, wheel_m, on_side)
     side_accel, clutch = row[col.RATIO] * accel, row[col.CLUTCH]
     inertia = row[col.PER_W] * accel + row[col.PER_N] * side_accel
     inertia += clutch * (row[col.SIDE_PER_W] * accel + row[col.SIDE_PER_N] * side_accel)
     return Meets(
-        -inertia - taken, row[col.ENGINE] + clutch * row[col.SIDE_ENGINE], wheel_m + clutch * side_m
-    )
+        -inertia - taken + (others + clutch * on_side),
+        row[col.ENGINE] + clutch * row[col.SIDE_ENGINE], wheel_m + clutch * side_m, on_side,
+    )  # fmt: skip
 
 
 @compiled()
@@ -114,22 +128,24 @@ def shared(
     rows: Array, way: int, variant: int, joints: int, asked: AskedStep, limits: Limits, closed: bool,
     launching: bool, machine_nm: Array,
 ) -> Shared:  # fmt: skip
-    """Torques of a step; machine_nm: scratch of one value."""
+    """Torques of a step; machine_nm: room for the first machine's, and those of the others."""
     for _ in range(_TRIES):
         row = rows[way, variant]
-        meets, clutch, engine = _meets(row, asked.accel, asked.lost_nm, closed), 0.0, 0.0
-        wanted = 0.0
+        meets = meets_of(row, asked.accel, asked.lost_nm, closed, machine_nm)
+        clutch, engine, wanted = 0.0, 0.0, 0.0
         if closed:
             engine, machine, wanted = _closed(asked, meets, limits)
             side_accel = row[col.RATIO] * asked.accel
             clutch = row[col.SIDE_ENGINE] * engine + row[col.MACHINES + 1] * machine
+            clutch += meets.on_side
             clutch -= row[col.SIDE_PER_W] * asked.accel + row[col.SIDE_PER_N] * side_accel
         elif launching:
             machine = _clip(asked.set_nm, asked.low_nm, asked.high_nm)
-            most = row[col.SIDE_ENGINE] * asked.most_nm + row[col.MACHINES + 1] * machine
+            on_side = row[col.MACHINES + 1] * machine + meets.on_side
+            most = row[col.SIDE_ENGINE] * asked.most_nm + on_side
             side_accel = 0.0
             clutch = (asked.wheel_nm - meets.c0 - meets.cm * machine) / row[col.CLUTCH]
-            wanted = (clutch - row[col.MACHINES + 1] * machine) / row[col.SIDE_ENGINE]
+            wanted = (clutch - on_side) / row[col.SIDE_ENGINE]
             if clutch > most and limits.boosts and meets.cm > 0.0:
                 machine = _clip(
                     (asked.wheel_nm - meets.c0 - row[col.CLUTCH] * most) / meets.cm,
@@ -139,7 +155,7 @@ def shared(
             # Where the slip ends within the step, the engine turns with the gears.
             through = clutch + row[col.SIDE_PER_W] * asked.accel
             through += row[col.SIDE_PER_N] * row[col.RATIO] * asked.accel
-            through -= row[col.MACHINES + 1] * machine
+            through -= row[col.MACHINES + 1] * machine + meets.on_side
             engine = _clip(through / row[col.SIDE_ENGINE], asked.least_nm, asked.most_nm)
         else:
             machine, side_accel = _open(asked, meets, limits), 0.0

@@ -26,23 +26,14 @@ from hevopt.forward._contact_kernels import (
     resistance,
     wheel_radps,
 )
-from hevopt.forward._rows_kernels import (
-    Array,
-    Inputs,
-    Outputs,
-    State,
-    Ways,
-    fill_row,
-    lost_nm,
-    turning,
-)
-from hevopt.forward._solve_kernels import Motion, directions, joint_torque_nm, solve, sums
+from hevopt.forward._round_kernels import SETTLED, found_of, row_of
+from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State, Ways, turning
+from hevopt.forward._solve_kernels import Motion, solve, sums
 from hevopt.units import STANDARD_GRAVITY_MPS2
 
 _ROUNDS = 60
 # Rounds after which every other one halves what is left between a slip too low and one too high.
 _NEWTONS = 8
-_SETTLED = 1e-13
 # Slip within which a guess is settled.
 _SETTLED_SLIP = 1e-11
 # Of what turns with the wheels, the share of the driven axle.
@@ -133,17 +124,15 @@ def slip_step(
     )
     off = state.side_radps - ratio * wheel
     moving = state.blend > 0.0 or inputs.blend > 0.0 or state.way != inputs.way
-    variant, joints = state.variant, ways.load.shape[2]
+    variant = state.variant
     guess_wheel, guess_side, guess_nm = 0.0, 0.0, state.lost_nm
     slip, speed, stands = state.slip, state.speed_mps, state.speed_mps == 0.0
     low, high = -np.inf, np.inf
     for n in range(_ROUNDS):
         lost = guess_nm
-        if moving:
-            fill_row(ways, state, inputs, variant, wheel, wheel + guess_wheel,
-                     state.side_radps + guess_side, row)  # fmt: skip
-        else:
-            row = rows[inputs.way, variant]
+        row = row_of(
+            ways, rows, state, inputs, variant, moving, wheel, guess_wheel, guess_side, row
+        )
         grip = _linear(state, ground, body, step_s, slip, speed, stands)
         at_none = grip.bias + grip.per_radps * wheel - slip
         motion = Motion(
@@ -153,21 +142,17 @@ def slip_step(
         s = sums(row, inputs.machine_nm, 0.0, off, per_s, lost)
         solved = solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                        inputs.capacity_nm)  # fmt: skip
-        found = directions(
-            row, joints, variant, inputs.machine_nm, solved, wheel + 0.5 * solved.wheel,
-            state.side_radps + 0.5 * solved.side, per_s, lost,
-        )  # fmt: skip
-        if ways.lost.loss_nm.size > 0:
-            through = joint_torque_nm(row, ways.lost.joint, inputs.machine_nm, solved, per_s, 0.0)
-            guess_nm = lost_nm(ways.lost, inputs.way, ratio * (wheel + 0.5 * solved.wheel), through)
+        found, guess_nm = found_of(
+            ways, row, state, inputs, variant, solved, ratio, wheel, per_s, lost
+        )
         after = grip.bias + grip.per_radps * (wheel + solved.wheel)
         force = grip.force_n + grip.slope_n * (after - slip)
         free = state.speed_mps + (force - ground.against_n) / stiff
         still = abs(after - slip) <= _SETTLED_SLIP * (1.0 + abs(after)) and stands == (free <= 0.0)
-        still = still and found == variant and abs(guess_nm - lost) <= _SETTLED * max(lost, 1.0)
+        still = still and found == variant and abs(guess_nm - lost) <= SETTLED * max(lost, 1.0)
         if moving:
-            still = still and abs(solved.wheel - guess_wheel) <= _SETTLED * abs(wheel)
-            still = still and abs(solved.side - guess_side) <= _SETTLED * state.side_radps
+            still = still and abs(solved.wheel - guess_wheel) <= SETTLED * abs(wheel)
+            still = still and abs(solved.side - guess_side) <= SETTLED * state.side_radps
         if still or n == _ROUNDS - 1:
             break
         if stands != (free <= 0.0) or found != variant:

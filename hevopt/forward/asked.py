@@ -174,7 +174,9 @@ def follow_asked(
         look = driving.seen(loop, at_s, decider.asking.interval_s, exact_s)
         command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
         task.way[d] = way(command.listed or int(gears[k]), command.gears)
-        task.engine_on[d], task.machine_nm[d] = command.engine_on, command.machines_nm[0]
+        task.engine_on[d] = command.engine_on
+        torques = [command.machines_nm[machine] for machine in line.order]
+        task.machine_nm[d], task.others_nm[d] = torques[0], torques[1:]
         if course is not None:
             course.engine_radps[d], course.engine_nm[d] = command.engine_radps, command.engine_nm
             course.machine_nm[d], course.closed[d] = command.machines_nm, command.closed
@@ -194,6 +196,6 @@ def _undecided(
     step = np.maximum(np.searchsorted(table.time_s, from_s[:-1] + 1e-9, "right") - 1, 0)
     plan = ForwardPlan(
         np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool), open_while[step], np.zeros(count),
-        np.full(count + 1, float(planned.energy_j[0])),
+        np.full(count + 1, float(planned.energy_j[0])), np.zeros((count, len(car.machines) - 1)),
     )  # fmt: skip
     return gears, step, task_of(car, cycle, plan, from_s)

@@ -97,7 +97,7 @@ def books_of(
     w, n, units = mean(turning.wheel), mean(turning.side), mean(turning.units)
     inertia = line.ways.inertia_kgm2[:, None] * np.diff(turning.units**2, axis=1) / (2 * step_s)
     rolls = w - mean(turning.spin)
-    flows = _driven(car, record, rolls, n, units, inertia, step_s)
+    flows = _driven(car, line, record, rolls, n, units, inertia, step_s)
     if slips:
         flows |= slipping(car, record, turning.wheel, turning.spin, flows["kinetic_w"], step_s)
     flows["auxiliary_power_w"] = load_w
@@ -128,6 +128,7 @@ def books_of(
 
 def _driven(
     car: Architecture,
+    line: Line,
     record: Array,
     w: Array,
     n: Array,
@@ -163,17 +164,17 @@ def _driven(
         * (record[:, col.SPEED] ** 2 - before**2)
         / (2 * step_s),
     }
-    for (machine, _), own_nm, speed_radps in zip(
-        car.driveline.machines, given, units[1:-1], strict=True
-    ):
-        flows[f"{machine}_torque_nm"], flows[f"{machine}_speed_radps"] = own_nm, speed_radps
+    for place, (machine, _) in enumerate(car.driveline.machines):
+        unit = line.order.index(place)
+        flows[f"{machine}_torque_nm"] = given[unit]
+        flows[f"{machine}_speed_radps"] = units[1 + unit]
     for number, name in CAUSES.items():
         flows[f"clutch_{name}_w"] = np.where(cause == number, clutch, 0.0)
     return flows
 
 
 def machines_nm(record: Array) -> Array:
-    """(machine, step) torques of all machines."""
+    """(machine, step) torques of all machines, in the order of a Line."""
     torques: Array = np.vstack([record[:, col.MACHINE], record[:, col.COLUMNS :].T])
     return torques
 

@@ -106,6 +106,11 @@ class CommandedCar:
         check_step(step_s, whole)
         check_geared(car, "a unit under commands")
         self.line = line_of(car)
+        if len(car.machines) > 1:
+            raise DataError(
+                f"{car.name}: commands are for a car of one machine, and this one has {len(car.machines)}; "
+                "`hevopt drive` drives it along a cycle"
+            )
         driver = whole.driver._replace(**_NO_GAINS)
         self._driven = loop_car(car, self.line, whole._replace(driver=driver))
         self._slips = whole.tyre.slips
@@ -178,7 +183,7 @@ class CommandedCar:
             ever, np.full(2, wanted), np.arctan(np.array([float(commands.grade)])), self._loads_w, ever,
             np.array([way], dtype=np.int64), np.array([on]),
             np.array([2 if commands.clutch_open else 0], dtype=np.int64),
-            np.array([float(commands.machine_nm)]), np.zeros(2),
+            np.array([float(commands.machine_nm)]), np.zeros(2), np.zeros((1, 0)),
         )  # fmt: skip
 
     def _way(self, commands: Commands) -> int:

@@ -26,22 +26,19 @@ def check_drivable(car: Architecture) -> None:
         lacking = "its engine is behind no driver's clutch and gears"
     elif odd or moved:
         lacking = f"the strategy moves {', '.join([*odd, *moved])}"
-    elif len(line.machines) != 1:
-        lacking = f"it has {len(line.machines)} machines"
     elif (mapped := mapped_boxes(line)) and (
         len(line.boxes) > 1
         or mapped[0].first not in {s for c in line.driver_clutches for s in c.shafts}
     ):
         lacking = "a loss_map is of more than one gearbox, or of one that is not behind the driver's clutch"
-    elif any(box.choice == "free" for box in line.boxes):
-        lacking = "more than one part follows a choice of its own"
-    if not lacking and len(limited_gears(line)) > (not line.free_engine_speed):
+    own = any(box.choice == "free" for box in line.boxes)
+    if not lacking and (own or len(limited_gears(line)) > (not line.free_engine_speed)):
         lacking = "more than one part follows a choice of its own"
     if lacking:
         raise DataError(
-            f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; drivelines with one "
-            "machine and no engine or one behind a driver's clutch and gears can, and with two whose engine has a "
-            "speed of its own; `hevopt run` solves it backward"
+            f"{car.name}: driveline {line.kind!r} cannot be driven forward yet, as {lacking}; those without an "
+            "engine can, with one behind a driver's clutch and gears, and with two machines and an engine that has "
+            "a speed of its own; `hevopt run` solves it backward"
         )
 
 

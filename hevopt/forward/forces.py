@@ -10,6 +10,8 @@ from hevopt.car.gear_loss import loss_at
 from hevopt.car.handling import Handling
 from hevopt.display.facts import Shown
 from hevopt.forward._acting_kernels import LoopCar
+from hevopt.forward._beside_kernels import floor_beside
+from hevopt.forward._lever_kernels import resting_lever
 from hevopt.forward.lines import Line
 from hevopt.problem.arrays import Array, Indices
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS, STANDARD_GRAVITY_MPS2
@@ -58,12 +60,13 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
             machine = tabulated(limits.load_nm[0], limits.engine_step, machine_speed)
         elif boosts:
             machine = tabulated(limits.high_nm, limits.machine_step, machine_speed)
-        on_side = full + ways.side[way, 1] * machine
+        machines = _floored(driven, way, wheel, side, machine, boosts)
+        on_side = full + ways.side[way, 1:-1] @ machines
         torque = ratio * ways.wheel_yield[way, 0, -1] * on_side
-        torque += ways.wheel[way, 1] * ways.wheel_yield[way, 0, 1] * machine
+        torque += (ways.wheel[way, 1:-1] * ways.wheel_yield[way, 0, 1:-1]) @ machines
         if line.mapped:
-            of_clutch, of_machine = ways.load[way, 0, ways.lost.joint, [-1, 1]]
-            through = of_clutch * on_side + of_machine * machine
+            load = ways.load[way, 0, ways.lost.joint]
+            through = load[-1] * on_side + load[1:-1] @ machines
             lost = lost_at(car, line.keys[way][0], ratio * wheel, through)
             torque -= ratio * ways.wheel_yield[way, 0, -1] * lost
         known = (side >= limits.idle_radps) & (side <= limits.engine_max_radps)
@@ -73,6 +76,20 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     tyre = driven.body.tyre
     grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
     return Curves(speed, np.array(forces), resistance, float(grip))
+
+
+def _floored(
+    driven: LoopCar, way: int, wheel: Array, side: Array, first_nm: Array, boosts: bool
+) -> Array:
+    """(machine, speed) torques at full pedal: the first machine's, and what the battery has left for the others."""
+    machines = np.zeros((len(driven.ways.inertia_kgm2) - 2, len(wheel)))
+    machines[0] = first_nm
+    for k in range(len(wheel) if len(machines) > 1 else 0):
+        own = np.ascontiguousarray(machines[:, k])
+        floor_beside(driven.beside, driven.ways, resting_lever(int(way)), wheel[k], side[k], driven.limits, boosts,
+                     own)  # fmt: skip
+        machines[:, k] = own
+    return machines
 
 
 def lost_at(car: Architecture, gear: int, speed_radps: Array, torque_nm: Array) -> Array:

@@ -1,9 +1,12 @@
 """A car's limits over speed, tabulated from its components for the loop."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.machine import Machine
+from hevopt.forward._beside_kernels import Beside
 from hevopt.forward._limits_kernels import Limits, Motors
 from hevopt.problem.arrays import Array
 from hevopt.problem.battery import power_limits_w
@@ -21,11 +24,13 @@ _BRAKING_MPS, _BRAKING_RATE = 0.25, 0.01
 _FASTEST_RADPS, _STRONGEST_NM = 2e4, 1e4
 
 
-def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> Limits:
-    """The limits of a car and its first machine; loads_w: least and greatest electric load, None for its own."""
+def limits_of(
+    car: Architecture, loads_w: tuple[float, float] | None = None, first: int = 0
+) -> Limits:
+    """The limits of a car and one of its machines; loads_w: least and greatest electric load, None for its own."""
     own_w = car.vehicle.auxiliary_power_w
     least_w, most_w = loads_w or (own_w, own_w)
-    engine, machine = car.engine, car.machines[0]
+    engine, machine = car.engine, car.machines[first]
     speed = np.arange(0.0, _BEYOND * engine.speed_max_radps, _ENGINE_STEP_RADPS)
     least = np.nan_to_num(engine.drag_nm(speed))
     full = engine.covered_nm(speed)
@@ -51,6 +56,23 @@ def limits_of(car: Architecture, loads_w: tuple[float, float] | None = None) -> 
         bool(car.functions & {"e_boost", "nox_cut", "power_management"}),
         "regenerative_braking" in car.functions,
     )  # fmt: skip
+
+
+def beside_of(
+    car: Architecture, others: Sequence[int], loads_w: tuple[float, float] | None
+) -> Beside:
+    """The limits of some machines of a car, each as if the battery were its alone."""
+    own_w = car.vehicle.auxiliary_power_w
+    count, points = len(others), _MACHINE_POINTS
+    found = Beside(
+        np.zeros(count), np.zeros((count, points)), np.zeros((count, points)), np.zeros((count, points, _TORQUES)),
+        np.zeros(count), *map(float, power_limits_w(car.battery)),
+    )  # fmt: skip
+    for n, machine in enumerate(car.machines[other] for other in others):
+        speed, found.most_nm[n], found.loss_w[n] = _tabulated(machine)
+        found.step_radps[n] = speed[1]
+        found.low_nm[n], found.high_nm[n] = _allowed(car, machine, speed, loads_w or (own_w, own_w))
+    return found
 
 
 def motors_of(car: Architecture) -> Motors:

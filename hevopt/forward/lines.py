@@ -48,6 +48,7 @@ class Line(Shown):
     losses: of each lossy joint, what its loss is called
     fast_way: (way,) the way with couplings opened that turn too fast; fast_radps: (way,) speed of the wheels for it
     free: of an engine that has a speed of its own, else None
+    order: numbers of the machines in the order of the units: the one first that has what the others leave
     """
 
     ways: Ways
@@ -56,6 +57,7 @@ class Line(Shown):
     fast_way: np.ndarray
     fast_radps: np.ndarray
     free: Free | None = None
+    order: tuple[int, ...] = (0,)
 
     def index(self, gear: int, gears: tuple[tuple[str, int], ...]) -> int:
         """The way of a listed gear and the gears chosen beside it; of the nearest gear where these exclude it."""
@@ -76,14 +78,15 @@ class Line(Shown):
 
 
 def line_of(car: Architecture) -> Line:
-    """The ways of a car; DataError where its driveline asks for more than a driver and one machine decide."""
+    """The ways of a car; DataError where its driveline asks for more than a driver decides."""
     check_drivable(car)
     line = car.driveline
     keys = [key for key in _keys(line)]
     joints = {key: _way(line, key).joints(key[0]) for key in keys}
     lossy = _lossy(joints[key] for key in keys)
-    machines = [name for name, _ in line.machines]
-    inertia = [car.engine.inertia_kgm2, *(m.inertia_kgm2 for m in car.machines), 0.0]
+    order = _order(car, keys)
+    machines = [line.machines[n][0] for n in order]
+    inertia = [car.engine.inertia_kgm2, *(car.machines[n].inertia_kgm2 for n in order), 0.0]
     units, count, variants = len(inertia), len(keys), 1 << len(lossy)
     ways = Ways(
         np.zeros((count, units)), np.zeros((count, units)),
@@ -101,7 +104,41 @@ def line_of(car: Architecture) -> Line:
                 per_wheel = speeds_of(_way(line, keys[n]))[part.first][WHEEL]
                 fast[n] = part.speed_max_radps / abs(float(np.max(np.abs(per_wheel))))
     free = _free(car, ways) if line.free_engine_speed else None
-    return Line(ways, tuple(keys), tuple(lossy.values()), fast_way, fast, free)
+    return Line(ways, tuple(keys), tuple(lossy.values()), fast_way, fast, free, order)
+
+
+def _order(car: Architecture, keys: list[Key]) -> tuple[int, ...]:
+    """Numbers of the machines, first the one that gives what is left of what the driver asks for.
+
+    It is the one that changes gear, else of those that turn with the wheels the most powerful one; a car whose
+    engine has a speed of its own has none such.
+    """
+    line, count = car.driveline, len(car.machines)
+    if count == 1 or line.free_engine_speed:
+        return tuple(range(count))
+    rates = np.zeros((count, len(keys)))
+    for k, key in enumerate(keys):
+        speeds = speeds_of(_way(line, key))
+        for n, (_, shaft) in enumerate(line.machines):
+            rates[n, k] = _rate(speeds.get(shaft, {}), WHEEL, key[0])
+    moved = (np.ptp(rates, axis=1) > 0).tolist()
+    if sum(moved) > 1:
+        names = ", ".join(
+            name for (name, _), moves in zip(line.machines, moved, strict=True) if moves
+        )
+        raise DataError(
+            f"{car.name}: cannot be driven forward, as {names} all change gear and one machine can; `hevopt run` "
+            "solves it backward"
+        )
+    turns = np.any(rates, axis=1).tolist()
+    first = max(range(count), key=lambda n: (moved[n], turns[n], car.machines[n].power_max_w, -n))
+    return (first, *(n for n in range(count) if n != first))
+
+
+def _rate(terms: Terms, base: str, gear: int) -> float:
+    """Speed of a shaft per speed of wheels or engine's side, in a gear."""
+    coefficient = terms.get(base, 0.0)
+    return float(coefficient[gear] if isinstance(coefficient, np.ndarray) else coefficient)
 
 
 def _free(car: Architecture, ways: Ways) -> Free:
@@ -197,8 +234,7 @@ def _fill(
     rates = speeds_of(found)
 
     def rate(shaft: str, base: str) -> float:
-        coefficient = rates[shaft].get(base, 0.0)
-        return float(coefficient[gear] if isinstance(coefficient, np.ndarray) else coefficient)
+        return _rate(rates[shaft], base, gear)
 
     for u, name in enumerate((*units, _OUTPUT)):
         if name in at:

@@ -23,7 +23,8 @@ class ForwardPlan(Shown):
 
     way: (time,) index of a Line; engine_on: (time,)
     open_while: (time,) the clutch is open: 0 never, 1 while the car is braked, 2 always
-    machine_nm: (time,) set-point of the machine while the engine drives; energy_j: (time + 1,) stored energy
+    machine_nm: (time,) set-point of the Line's first machine while the engine drives
+    others_nm: (time, machine - 1) of those beside it; energy_j: (time + 1,) stored energy
     course: of an engine that has a speed of its own, else None
     """
 
@@ -32,6 +33,7 @@ class ForwardPlan(Shown):
     open_while: Indices
     machine_nm: Array
     energy_j: Array
+    others_nm: Array
     course: FreeCourse | None = None
 
 
@@ -43,21 +45,23 @@ def replay_of(trajectory: Trajectory, line: Line) -> ForwardPlan:
     states = flows.states(columns[trajectory.control])
     in_gear, open_while = driver_gears(signals, states)
     way = [line.index(int(g), state.gears) for g, state in zip(in_gear, states, strict=True)]
-    machine, course = trajectory.flows[f"{flows.machines[0]}_torque_nm"], None
+    found, course = trajectory.flows, None
+    torques = _own(np.stack([found[f"{name}_torque_nm"] for name in flows.machines], axis=1))
+    ordered = _own(torques[:, list(line.order)])
     if line.free is not None:
-        found = trajectory.flows
         course = FreeCourse(
             _own(found["engine_speed_radps"]),
             _own(found["engine_torque_nm"]),
-            _own(np.stack([found[f"{name}_torque_nm"] for name in flows.machines], axis=1)),
+            torques,
             np.array([bool(state.closed) for state in states]),
         )
     return ForwardPlan(
         np.array(way, dtype=np.int64),
         np.array([state.engine_on for state in states]),
         open_while,
-        _own(machine),
+        _own(ordered[:, 0]),
         _own(trajectory.energy_j),
+        _own(ordered[:, 1:]),
         course,
     )
 

@@ -17,7 +17,7 @@ from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._contact_kernels import Body
 from hevopt.forward.books import Books, books_of
 from hevopt.forward.breathing import EngineModel
-from hevopt.forward.limits import limits_of
+from hevopt.forward.limits import beside_of, limits_of
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.loops import Driving
 from hevopt.forward.plans import ForwardPlan
@@ -181,8 +181,10 @@ def loop_car(
     )  # fmt: skip
     loads = None if load_w is None else (float(load_w.min()), float(load_w.max()))
     low, high = (float(energy_j(pack, end)) for end in (pack.soc_min, pack.soc_max))
-    return LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car, loads), pack.arrays,
-                   (low, high), _floats(shifting), _floats(handling.driver))  # fmt: skip
+    others = () if line.free is not None else line.order[1:]
+    return LoopCar(body, line.ways, line.fast_way, line.fast_radps, limits_of(car, loads, line.order[0]),
+                   beside_of(car, others, loads), pack.arrays, (low, high), _floats(shifting),
+                   _floats(handling.driver))  # fmt: skip
 
 
 def _floats(part: _Part) -> _Part:
@@ -204,7 +206,7 @@ def task_of(car: Architecture, cycle: Cycle, plan: ForwardPlan, from_s: Array) -
     return LoopTask(
         own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), _loads_w(car, cycle),
         own(from_s), plan.way,
-        plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j,
+        plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j, plan.others_nm,
     )  # fmt: skip
 
 

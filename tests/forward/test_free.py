@@ -141,5 +141,3 @@ def test_what_such_a_car_is_not_driven_by_is_told():
         performance(car)
     with pytest.raises(DataError, match="under commands is for an engine behind clutch and gears"):
         CommandedCar(car)
-    with pytest.raises(DataError, match=r"belt_and_axle.*2 machines"):
-        line_of(load_architecture("p0_p4_diesel"))

@@ -113,6 +113,25 @@ def test_ten_seconds_more_at_rest_cost_idling_only():
     assert second.fuel_kg - first.fuel_kg == pytest.approx(10 * idle, rel=1e-6)
 
 
+@pytest.mark.parametrize("lag_s", [0.0, 0.03])
+def test_a_change_of_gear_takes_off_the_trace_what_a_car_loses_in_its_gap(lag_s):
+    """Half a second without torque up a slope: speed lacks what was to be gained, and what the road takes.
+
+    Neither the tyres' lag nor the step makes it, as both keep less than a tenth of it.
+    """
+    run = drive(
+        load_architecture("A"),
+        ramp(10, 10, 40, grade=0.01),
+        "baseline",
+        handling=Handling(Tyre(lag_s)),
+    ).run
+    lacking = run.wanted_mps - run.speed_mps
+    k = int(np.argmax(lacking))
+    against_n = run.books.flows["road_w"][k] / run.books.flows["speed_mps"][k]
+    lost = run.handling.shifting.gap_s * (1.0 + against_n / run.car.vehicle.equivalent_mass_kg)
+    assert 0.5 < lacking[k] == pytest.approx(lost, rel=0.05)
+
+
 def test_a_lazy_driver_leaves_the_trace_and_the_run_says_where():
     car, cycle, plan, _ = plan_of("A")
     lazy = DriverGains(proportional=0.5, integral=0.05, feed_forward=0.0)
