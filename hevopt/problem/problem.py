@@ -134,8 +134,8 @@ class Trajectory(Shown):
     energy_j, soc: (time + 1,), stored energy and state of charge at the steps' ends
     mode, fuel_kg, nox_kg, battery_power_w: (time,); fuel includes the cost of switching in its step
     switch_fuel_kg, switch_energy_j: (time,) what switching took, the energy from the battery before the step
-    flows: name -> (time,) powers, speeds, torques and losses
-    residuals: component -> (time,) power balance, in W, 0 up to rounding
+    flows: name -> (time,) powers, speeds, torques and losses, worked out where they are first asked for
+    residuals: component -> (time,) power balance, in W, 0 up to rounding; likewise
     """
 
     problem: Problem

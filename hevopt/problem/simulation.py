@@ -17,6 +17,7 @@ from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.flows import Flows
+from hevopt.problem.late import Late
 from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.reject import REJECT_WORDS
 from hevopt.problem.switching import switched
@@ -45,11 +46,14 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
     _check_window(problem, energy_j, switch.energy_j)
     fuel_kg = table.fuel_kg[steps, control] + switch.kg
     nox_kg = table.nox_kg[steps, control]
-    flows = cast(Flows, table.flows).along(control)
-    between_j = energy_j[:-1] - switch.energy_j
-    flows |= battery_model.step_flows(
-        problem.battery, between_j, energy_j[1:], power_w, table.step_s
-    )
+
+    def worked_out() -> dict[str, Array]:
+        between_j = energy_j[:-1] - switch.energy_j
+        return cast(Flows, table.flows).along(control) | battery_model.step_flows(
+            problem.battery, between_j, energy_j[1:], power_w, table.step_s
+        )
+
+    flows = Late(worked_out)
     return Trajectory(
         problem=problem,
         control=control,
@@ -63,7 +67,7 @@ def simulate(problem: Problem, control: ArrayLike) -> Trajectory:
         battery_power_w=power_w,
         cost_kg=float(np.sum(problem.cost_kg[steps, control] + switch.kg)),
         flows=flows,
-        residuals=_residuals(table, flows, power_w, switch.energy_j),
+        residuals=Late(lambda: _residuals(table, flows, power_w, switch.energy_j)),
     )
 
 

@@ -25,6 +25,7 @@ from hevopt.problem.choices import Choices, State, choices_of, require_choices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _family_kernels as family
 from hevopt.strategies import _rule_kernels as kernels
+from hevopt.strategies._entries import least_entries, step_minimum
 
 _CHARGE_LEVELS, _ASSIST_LEVELS = 41, 20
 # Electric driving stops here where nothing says otherwise: this share of the SOC window above its lower end.
@@ -120,7 +121,7 @@ def rules_of(problem: Problem, like: Rules | None = None) -> Rules:
     steps = family.FamilySteps(
         off=least_entries(choices, choices.power_w, ~on),
         electric=least_entries(choices, choices.power_w, fuel == 0),
-        recover=least_entries(choices, choices.power_w, fuel == _step_minimum(choices, fuel)[step]),
+        recover=least_entries(choices, choices.power_w, fuel == step_minimum(choices, fuel)[step]),
         standing=standing,
         engaging=standing & (signals.gear > 0),
         braking=signals.wheel_power_w < 0,
@@ -168,17 +169,22 @@ def figures_of(
     engine: (level, time) entries by charging power, of `engine_entries`
     quick: of drives that end with up to a level's charge more than neutral
     """
-    rows = np.array([_row(rules, own) for own in limits])
     kernel = family.screened if quick else family.judged
     battery = rules.problem.battery.arrays
-    return kernel(rules.steps, rows, engine, rules.choices, rules.span, battery)
+    return kernel(rules.steps, _rows(rules, limits), engine, rules.choices, rules.span, battery)
 
 
 def tried(
     rules: Rules, limits: Sequence[ElectricLimits], engine: Indices, **settings: float
 ) -> list[Tried]:
     """Neutral members of a family with one list of engine's entries; settings: what else the calibration tells."""
-    results = figures_of(rules, limits, engine)
+    return as_tried(limits, engine, figures_of(rules, limits, engine), **settings)
+
+
+def as_tried(
+    limits: Sequence[ElectricLimits], engine: Indices, results: Array, **settings: float
+) -> list[Tried]:
+    """Members of a family by their limits and (member, 4) results; see `tried`."""
     return [
         Tried(own, {**told(own), **settings}, engine, result)
         for own, result in zip(limits, results, strict=True)
@@ -248,15 +254,15 @@ def calibrated(
 
 def rule_for(rules: Rules, limits: ElectricLimits) -> kernels.Rule:
     """The rule of a member with some limits."""
-    rule: kernels.Rule = family.rule_of(rules.steps, _row(rules, limits))
+    rule: kernels.Rule = family.rule_of(rules.steps, _rows(rules, [limits])[0])
     return rule
 
 
-def _row(rules: Rules, limits: ElectricLimits) -> Array:
-    """ElectricLimits with the stored energy in place of the state of charge."""
-    battery = rules.problem.battery
-    soc = np.clip(limits.soc, battery.soc_min, battery.soc_max)
-    return np.array([float(energy_j(battery, soc)), limits.power_w, limits.speed_mps])
+def _rows(rules: Rules, limits: Sequence[ElectricLimits]) -> Array:
+    """(member, 3) ElectricLimits with the stored energy in place of the state of charge."""
+    battery, rows = rules.problem.battery, np.array(limits, dtype=np.float64)
+    rows[:, 0] = energy_j(battery, np.clip(rows[:, 0], battery.soc_min, battery.soc_max))
+    return rows
 
 
 def engine_entries(rules: Rules, nox_cap_kgps: float = np.inf) -> Indices:
@@ -279,18 +285,3 @@ def idle_entries(rules: Rules) -> Indices:
     """(time,) those of them that leave the battery alone."""
     entries: Indices = shifted_entries(rules)[_ASSIST_LEVELS]
     return entries
-
-
-def least_entries(choices: Choices, figure: Array, allowed: Flags) -> Indices:
-    """(time,) entry of least figure among the allowed ones, -1 where there is none."""
-    masked = np.where(allowed, figure, np.inf)
-    least = _step_minimum(choices, masked)
-    step = choices.spread(np.arange(choices.steps))
-    hits = np.flatnonzero((masked == least[step]) & np.isfinite(masked))
-    entry = np.full(choices.steps, -1, dtype=np.int64)
-    entry[step[hits][::-1]] = hits[::-1]
-    return entry
-
-
-def _step_minimum(choices: Choices, figure: Array) -> Array:
-    return np.minimum.reduceat(figure, choices.first[:, 0])

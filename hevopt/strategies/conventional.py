@@ -18,6 +18,7 @@ from hevopt.strategies._rules import (
     Calibrated,
     ElectricLimits,
     Rules,
+    as_tried,
     calibrated,
     corrected_kg,
     eligible,
@@ -25,7 +26,6 @@ from hevopt.strategies._rules import (
     figures_of,
     rules_of,
     told,
-    tried,
 )
 from hevopt.strategies._rules_driven import DrivenRule
 
@@ -53,12 +53,12 @@ def start(
     coarse = [np.unique(np.append(axis[::4], axis[-1])) for axis in axes]
     near = [ElectricLimits(*limits) for limits in product(*coarse)]
     centre = near[int(np.argmin(_ranked(rules, figures_of(rules, near, engine, quick=True))))]
-    centre = _improved(rules, axes, centre, engine, quick=True)
-    centre = _improved(rules, axes, centre, engine, quick=False)
-    members = tried(rules, _sections(axes, centre), engine)
+    centre, _ = _improved(rules, axes, centre, engine, quick=True)
+    centre, results = _improved(rules, axes, centre, engine, quick=False)
+    family = as_tried(_sections(axes, centre), engine, results)
     own = told(centre).items()
     return calibrated(
-        rules, members, lambda member: (member["corrected_kg"], not own <= member.items())
+        rules, family, lambda member: (member["corrected_kg"], not own <= member.items())
     )
 
 
@@ -106,16 +106,17 @@ def _axes(rules: Rules) -> list[Array]:
 
 def _improved(
     rules: Rules, axes: Sequence[Array], centre: ElectricLimits, engine: Indices, *, quick: bool
-) -> ElectricLimits:
-    """A member that none on the lines through it is better than, found from another on."""
-    for _ in range(_ROUNDS):
+) -> tuple[ElectricLimits, Array]:
+    """A member that none on the lines through it is better than, found from another on, and the figures there."""
+    for improved in range(_ROUNDS + 1):
         limits = _sections(axes, centre)
-        ranks = _ranked(rules, figures_of(rules, limits, engine, quick=quick))
+        results = figures_of(rules, limits, engine, quick=quick)
+        ranks = _ranked(rules, results)
         best = int(np.argmin(ranks))
-        if ranks[best] >= ranks[limits.index(centre)]:
+        if improved == _ROUNDS or ranks[best] >= ranks[limits.index(centre)]:
             break
         centre = limits[best]
-    return centre
+    return centre, results
 
 
 def _ranked(rules: Rules, results: Array) -> Array:

@@ -18,8 +18,9 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import energy_j, soc
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _hysteresis_kernels as kernels
+from hevopt.strategies._entries import least_entries
 from hevopt.strategies._hysteresis import HysteresisStepper, best_limits
-from hevopt.strategies._rules import Rules, idle_entries, least_entries, rules_of
+from hevopt.strategies._rules import Rules, idle_entries, rules_of
 
 # Of the window's width above its lower end: 39 values.
 _SOC_SHARES = np.arange(1, 40) / 40

@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+
 from hevopt.bounds.certificate import Claim
 from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown
@@ -188,13 +190,14 @@ def shortfall_steps(problem: Problem) -> int:
 
 def engine_starts(problem: Problem, trajectory: Trajectory) -> int:
     """How often the engine goes from rest to turning."""
-    on = [problem.table.controls[c].engine_on for c in trajectory.control]
+    of_control = np.array([control.engine_on for control in problem.table.controls])
+    on = of_control[trajectory.control]
     start_on = any(
         control.engine_on
         for control, mode in zip(problem.table.controls, problem.table.mode, strict=True)
         if mode == problem.start_mode
     )
-    return sum(now and not before for before, now in zip([start_on, *on], on, strict=False))
+    return int(np.sum(on & ~np.append(start_on, on[:-1])))
 
 
 def _percent(part: float, whole: float) -> float | None:
