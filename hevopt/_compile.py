@@ -1,6 +1,7 @@
 """The one way hevopt compiles its loops: the same bits however one came about, kept on disk where there is a place.
 
-Arithmetic is that of IEEE 754, in the order written. Freedom to reorder sums or to fuse them with products would
+Arithmetic is that of IEEE 754, in the order written, division by zero included: a test before every division would
+keep loops from doing several at a time. Freedom to reorder sums or to fuse them with products would
 be used one way where a loop is compiled with what it calls, another where a part of it comes from the disk.
 
 What is kept is one file per loop and types, written whole under another name first, with a digest in front: a file
@@ -27,7 +28,8 @@ from numba.core.runtime import rtsys
 _DIGEST_BYTES = hashlib.sha256().digest_size
 # Files of loops, and of the tuples and constants that they are compiled with.
 _COMPILED_WITH = (
-    "_*kernels.py", "parameters.py", "states.py", "handling.py", "choices.py", "switching.py", "units.py",
+    "_*kernels.py", "_compile.py", "parameters.py", "states.py", "handling.py", "choices.py", "switching.py",
+    "units.py",
 )  # fmt: skip
 _Loop = TypeVar("_Loop", bound=Callable[..., Any])
 
@@ -41,7 +43,7 @@ def compiled(
     """
 
     def decorate(function: _Loop) -> _Loop:
-        loop: Any = numba.njit(inline=inline, nogil=nogil)(function)
+        loop: Any = numba.njit(inline=inline, nogil=nogil, error_model="numpy")(function)
         if isinstance(loop, Dispatcher):
             try:
                 loop._cache = _Cache(function)  # type: ignore[attr-defined]

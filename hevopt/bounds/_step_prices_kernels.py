@@ -10,6 +10,8 @@ from hevopt.problem._battery_kernels import (
     chemical_power,
     chemical_power_at,
     drain_and_slope,
+    touch_at,
+    touching,
 )
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices, State
@@ -62,6 +64,23 @@ def _worth_with_first_step(
 
 
 @compiled()
+def _tangents(
+    x: float, powers: Array, weight: float, tilt: float, battery: BatteryArrays, found: Array
+) -> None:
+    """(2, entry) height and slope of  weight r(x) + tilt x  for each of some powers, several of them at a time."""
+    touch, capacity, efficiency = (
+        touch_at(x, battery),
+        battery.capacity_as,
+        battery.coulombic_efficiency,
+    )
+    height, slope = found[0], found[1]
+    for i in range(len(powers)):
+        drain, rise = touching(powers[i], touch, capacity, efficiency)
+        height[i] = weight * drain + tilt * x
+        slope[i] = weight * rise + tilt
+
+
+@compiled()
 def worth_by_tangents(
     choices: Choices,
     price: Array,
@@ -79,29 +98,34 @@ def worth_by_tangents(
     first, power, step_s = choices.first, choices.power_w, choices.step_s
     low, high = window
     worth = _worth_with_first_step(choices, price, start, battery)
+    found, touched = (
+        np.empty((3, 2, (first[:, -1] - first[:, 0]).max())),
+        np.array([low, low, high]),
+    )
     for k in range(1, len(step_s)):
-        after = price[k]
-        tilt = price[k - 1] - after
-        middle = min(max(rollout[k], low), high)
-        for i in range(first[k, 0], first[k, -1]):
+        begin, end, weight, tilt = (
+            first[k, 0],
+            first[k, -1],
+            price[k] * step_s[k],
+            price[k - 1] - price[k],
+        )
+        touched[1] = min(max(rollout[k], low), high)
+        for n in range(3):
+            _tangents(touched[n], power[begin:end], weight, tilt, battery, found[n])
+        for i in range(begin, end):
             if steep[i]:
                 drain = chemical_power_at(power[i], high, battery)
-                worth[i] = after * step_s[k] * drain + min(tilt * low, tilt * high)
+                worth[i] = weight * drain + min(tilt * low, tilt * high)
                 continue
-            best = -np.inf
-            left_x, left_y, left_s = 0.0, 0.0, 0.0
-            for n in range(3):
-                x = low if n == 0 else (middle if n == 1 else high)
-                drain, slope = drain_and_slope(power[i], x, battery)
-                y = after * step_s[k] * drain + tilt * x
-                s = after * step_s[k] * slope + tilt
-                if s >= 0.0:
-                    # The envelope turns upward here: its least is where this tangent meets the last.
-                    best = y if n == 0 else _meeting(left_x, left_y, left_s, x, y, s)
-                    break
-                left_x, left_y, left_s = x, y, s
-                best = y
-            worth[i] = best
+            of, n = i - begin, 0
+            while n < 3 and not found[n, 1, of] >= 0.0:
+                n += 1
+            # Where the envelope turns upward its least is where this tangent meets the last.
+            if n == 0 or n == 3:
+                worth[i] = found[min(n, 2), 0, of]
+            else:
+                y, s = found[:, 0, of], found[:, 1, of]
+                worth[i] = _meeting(touched[n - 1], y[n - 1], s[n - 1], touched[n], y[n], s[n])
     return worth
 
 

@@ -79,27 +79,58 @@ def chemical_power_at(power: float, energy: float, battery: BatteryArrays) -> fl
     return chemical_power(power, voltage, discharge, charging, battery.coulombic_efficiency)
 
 
-@compiled()
-def drain_and_slope(power: float, energy: float, battery: BatteryArrays) -> tuple[float, float]:
+class Touch(NamedTuple):
+    """The curves at a stored energy: voltage, resistances, and their slopes by state of charge in the segment."""
+
+    voltage: float
+    discharge: float
+    charging: float
+    volt_slope: float
+    discharge_slope: float
+    charging_slope: float
+
+
+@compiled(inline="always")
+def touch_at(energy: float, battery: BatteryArrays) -> Touch:
+    """The curves at a stored energy."""
+    i = _segment_at(energy, battery)
+    _, voltage, discharge, charging = _state_in(i, energy, battery)
+    width = battery.soc[i + 1] - battery.soc[i]
+    return Touch(
+        voltage,
+        discharge,
+        charging,
+        (battery.open_circuit_v[i + 1] - battery.open_circuit_v[i]) / width,
+        (battery.discharge_ohm[i + 1] - battery.discharge_ohm[i]) / width,
+        (battery.charge_ohm[i + 1] - battery.charge_ohm[i]) / width,
+    )
+
+
+@compiled(inline="always")
+def touching(
+    power: float, touch: Touch, capacity_as: float, efficiency: float
+) -> tuple[float, float]:
     """Rate at which stored energy falls, and its derivative by stored energy within the segment.
 
     At constant P the current I obeys  dI/dU = -I / root,  dI/dR = I² / root,  so that of U I
     d(U I)/dU = -2 R I² / root  and  d(U I)/dR = U I² / root;  SOC rises by 1 / (Q U) per joule.
     """
-    i = _segment_at(energy, battery)
-    _, voltage, discharge, charging = _state_in(i, energy, battery)
-    resistance, ohms, efficiency = discharge, battery.discharge_ohm, 1.0
-    if power < 0.0:
-        resistance, ohms = charging, battery.charge_ohm
-        efficiency = battery.coulombic_efficiency
+    voltage = touch.voltage
+    resistance = touch.charging if power < 0.0 else touch.discharge
+    ohm_slope = touch.charging_slope if power < 0.0 else touch.discharge_slope
+    kept = efficiency if power < 0.0 else 1.0
     chemical, root = source_power(power, voltage, resistance)
-    width = battery.soc[i + 1] - battery.soc[i]
-    volt_slope = (battery.open_circuit_v[i + 1] - battery.open_circuit_v[i]) / width
-    ohm_slope = (ohms[i + 1] - ohms[i]) / width
     current = chemical / voltage
-    change = current * current * (voltage * ohm_slope - 2.0 * resistance * volt_slope)
-    per_joule = max(root, _LEAST_ROOT * voltage) * battery.capacity_as * voltage
-    return efficiency * chemical, efficiency * change / per_joule
+    change = current * current * (voltage * ohm_slope - 2.0 * resistance * touch.volt_slope)
+    per_joule = max(root, _LEAST_ROOT * voltage) * capacity_as * voltage
+    return kept * chemical, kept * change / per_joule
+
+
+@compiled()
+def drain_and_slope(power: float, energy: float, battery: BatteryArrays) -> tuple[float, float]:
+    """Rate at which stored energy falls, and its derivative by stored energy; see `touching`."""
+    touch = touch_at(energy, battery)
+    return touching(power, touch, battery.capacity_as, battery.coulombic_efficiency)
 
 
 @compiled()

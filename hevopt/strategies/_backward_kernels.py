@@ -72,6 +72,11 @@ def _shift(
     """Relax nodes low <= j < high whose target lies start + slope (j - low) cells away."""
     floor_kg, ceiling_kg, _ = penalty
     nodes = len(value)
+    cells = int(np.floor(start))
+    if np.floor(start + slope * (high - 1 - low)) == cells and -low <= cells <= nodes - 1 - high:
+        # All within the grid, and by the same number of whole cells, as for most.
+        _relax(best, value, cost, low, high, cells, start - cells, slope)
+        return
     j = low
     while j < high:
         moved = start + slope * (j - low)
@@ -100,6 +105,23 @@ def _shift(
             at_first = cost + value[nodes - 1] + ceiling_kg * above
             _line(best, top, run, at_first, ceiling_kg * (1.0 + slope))
         j = run
+
+
+@compiled()
+def _moves(
+    power: Array,
+    state: Array,
+    efficiency: float,
+    scale: float,
+    drift: float,
+    moved: Array,
+) -> None:
+    """(entry,) cells that each of some powers moves a node of a battery's state by, several of them at a time."""
+    voltage, discharge, charging = state[0], state[1], state[2]
+    for i in range(len(power)):
+        moved[i] = drift + scale * chemical_power(
+            power[i], voltage, discharge, charging, efficiency
+        )
 
 
 @compiled()
@@ -185,7 +207,7 @@ def _fill_back(
     """
     first, grid_low, cell = choices.first, grid.low_j, grid.cell_j
     steps, modes, nodes = first.shape[0], value.shape[1], value.shape[2]
-    least = np.empty((modes, nodes))
+    least, moved = np.empty((modes, nodes)), np.empty((2, (first[:, -1] - first[:, 0]).max()))
     efficiency = battery.coulombic_efficiency
     for k in range(steps - 1, -1, -1):
         breaks, states = _bends(between_j[k], cell, nodes, battery)
@@ -193,22 +215,16 @@ def _fill_back(
         scale = -choices.step_s[k] / cell
         for n in range(modes):
             least[n] = penalty.unreachable_kg
-            for i in range(first[k, n], first[k, n + 1]):
-                p = choices.power_w[i]
-                end = drift + scale * chemical_power(
-                    p, states[0, 0], states[0, 1], states[0, 2], efficiency
-                )
-                for b in range(len(breaks) - 1):
-                    low, high = breaks[b], breaks[b + 1]
-                    start = end
-                    end = drift + scale * chemical_power(
-                        p, states[b + 1, 0], states[b + 1, 1], states[b + 1, 2], efficiency
-                    )
-                    last = high + 1 if b == len(breaks) - 2 else high
-                    slope = (end - start) / (high - low)
-                    _shift(
-                        least[n], value[k + 1, n], choices.cost_kg[i], low, last, start, slope,
-                        penalty,
-                    )  # fmt: skip
+            begin, end = first[k, n], first[k, n + 1]
+            power, cost = choices.power_w[begin:end], choices.cost_kg[begin:end]
+            _moves(power, states[0], efficiency, scale, drift, moved[0])
+            for b in range(len(breaks) - 1):
+                low, high = breaks[b], breaks[b + 1]
+                start, after = moved[b % 2], moved[(b + 1) % 2]
+                _moves(power, states[b + 1], efficiency, scale, drift, after)
+                last = high + 1 if b == len(breaks) - 2 else high
+                for i in range(end - begin):
+                    slope = (after[i] - start[i]) / (high - low)
+                    _shift(least[n], value[k + 1, n], cost[i], low, last, start[i], slope, penalty)
         apart = (grid_low[k] - between_j[k]) / cell
         _switch_back(value[k], least, choices.switching, k, apart, cell, penalty)

@@ -8,15 +8,8 @@ from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices
-from hevopt.strategies._rule_kernels import (
-    Rule,
-    RuleDrive,
-    Span,
-    at_rest,
-    drive_on,
-    enough,
-    neutral_drive,
-)
+from hevopt.strategies._neutral_kernels import abreast_at_rest, enough, lane_of, neutral_drive
+from hevopt.strategies._rule_kernels import Rule, RuleDrive, Span
 
 
 class FamilySteps(NamedTuple):
@@ -112,10 +105,10 @@ def screened(
 ) -> Array:
     """(member, 4) as `judged`, of drives that keep the lowest charging power that is enough to their end."""
     found, hint = np.empty((len(limits), 4)), len(engine) // 2
-    driven = at_rest(len(choices.step_s), span.start)
+    drives = abreast_at_rest(3, len(choices.step_s), span.start)
     for n in range(len(limits)):
         rule = rule_of(steps, limits[n])
-        hint = enough(rule, engine, hint, choices, span, battery, driven)
-        drive_on(rule, engine[min(hint, len(engine) - 1)], 0, choices, battery, driven)
+        hint, lane, below = enough(rule, engine, hint, choices, span, battery, drives)
+        driven = lane_of(drives, lane if lane >= 0 else below)
         found[n] = result_of(driven, steps.nox_kg, choices, span)
     return found

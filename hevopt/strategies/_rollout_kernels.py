@@ -29,6 +29,7 @@ class Course(NamedTuple):
     """How far a rollout has come.
 
     path: (time,) entries; energy, mode: (time + 1,) before each step; closed: (entry,) dead ends
+    after: (entry,) room for stored energies after a step
     at: [present step, furthest step, moves made]
     """
 
@@ -37,6 +38,25 @@ class Course(NamedTuple):
     mode: Indices
     closed: Flags
     at: Indices
+    after: Array
+
+
+@compiled()
+def _afters(
+    low: int,
+    high: int,
+    energy: float,
+    state: tuple[float, float, float],
+    step: float,
+    efficiency: float,
+    power: Array,
+    after: Array,
+) -> None:
+    """Stored energy after a step with each of the entries low <= i < high, several of them at a time."""
+    voltage, discharge, charging = state
+    some, left = power[low:high], after[low:high]
+    for i in range(high - low):
+        left[i] = energy - step * chemical_power(some[i], voltage, discharge, charging, efficiency)
 
 
 @compiled()
@@ -60,23 +80,23 @@ def _best_choice(
     before, mode = progress.energy[k], progress.mode[k]
     switching, case = choices.switching, choices.switching.case[k]
     best, chosen, chosen_mode, chosen_energy = np.inf, -1, 0, 0.0
-    energy = before
-    _, voltage, discharge, charging = state_at(energy, battery)
+    energy, efficiency = before, battery.coulombic_efficiency
+    state = state_at(energy, battery)[1:]
     for n in range(modes):
         if not switching.allowed[case, mode, n]:
             continue
         if before - switching.energy_j[case, mode, n] != energy:
             energy = before - switching.energy_j[case, mode, n]
-            _, voltage, discharge, charging = state_at(energy, battery)
+            state = state_at(energy, battery)[1:]
         if not (low - slack <= energy <= high + slack):
             continue
-        for i in range(first[k, n], first[k, n + 1]):
+        begin, end = first[k, n], first[k, n + 1]
+        afters = progress.after
+        _afters(begin, end, energy, state, choices.step_s[k], efficiency, choices.power_w, afters)
+        for i in range(begin, end):
             if progress.closed[i]:
                 continue
-            drain = chemical_power(
-                choices.power_w[i], voltage, discharge, charging, battery.coulombic_efficiency
-            )
-            after = energy - choices.step_s[k] * drain
+            after = afters[i]
             if not (least[k + 1, n] - slack <= after <= greatest[k + 1, n] + slack):
                 continue
             place = (after - grid.low_j[k + 1]) / grid.cell_j
@@ -107,7 +127,7 @@ def rollout(
     entered and closed, so that with enough budget every path is tried.
     """
     first, end = choices.first, begin + len(value) - 1
-    path, energy, mode, closed, at = progress
+    path, energy, mode, closed, at, _ = progress
     k, furthest, moves = at[0], at[1], at[2]
     while begin <= k < end and moves < budget:
         moves += 1

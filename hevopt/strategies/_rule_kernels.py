@@ -46,7 +46,7 @@ class RuleDrive(NamedTuple):
 def load_point_choices(
     choices: Choices, nox: Array, fired: Flags, charge_w: Array, nox_cap_kgps: float
 ) -> Indices:
-    """(level, time) entry of least cost among fired ones that charge at least charge_w[level] within the cap.
+    """(level, time) entry of least cost among fired ones that charge at least charge_w[level], rising, in the cap.
 
     Where none does: the entry within the cap that charges most; where none is within it, that of least NOx.
     -1 where the step has no fired entry at all.
@@ -54,9 +54,10 @@ def load_point_choices(
     first, cost, power, step_s = choices.first, choices.cost_kg, choices.power_w, choices.step_s
     steps, levels = len(step_s), len(charge_w)
     chosen = np.full((levels, steps), -1, dtype=np.int64)
+    best = np.empty(levels)
     for k in range(steps):
         most, least_nox = -1, -1
-        best = np.full(levels, np.inf)
+        best[:] = np.inf
         for i in range(first[k, 0], first[k, -1]):
             if not fired[i]:
                 continue
@@ -66,12 +67,14 @@ def load_point_choices(
                 continue
             if most < 0 or (power[i], cost[i]) < (power[most], cost[most]):
                 most = i
-            for level in range(levels):
-                if power[i] > -charge_w[level]:
-                    break
-                if cost[i] < best[level]:
-                    best[level] = cost[i]
-                    chosen[level, k] = i
+            # The highest level that it charges enough for; of those below, it stands for each as well.
+            level = np.searchsorted(charge_w, -power[i], "right") - 1
+            if level >= 0 and cost[i] < best[level]:
+                best[level], chosen[level, k] = cost[i], i
+        for level in range(levels - 2, -1, -1):
+            above = chosen[level + 1, k]
+            if above >= 0 and (best[level + 1], above) < (best[level], chosen[level, k]):
+                best[level], chosen[level, k] = best[level + 1], above
         for level in range(levels):
             if chosen[level, k] < 0:
                 chosen[level, k] = most if most >= 0 else least_nox
@@ -153,65 +156,3 @@ def at_rest(steps: int, start: State) -> RuleDrive:
     )
     driven.energy_j[0], driven.mode[0] = start.energy_j, start.mode
     return driven
-
-
-@compiled()
-def enough(
-    rule: Rule,
-    engine: Indices,
-    hint: int,
-    choices: Choices,
-    span: Span,
-    battery: BatteryArrays,
-    driven: RuleDrive,
-) -> int:
-    """The lowest charging power, (level,), that ends with enough charge; as many as there are where none does.
-
-    engine: (level, time) entries by rising charging power. More charging leaves more charge, so that levels further
-    and further from a hint are tried until one is enough and one is not, then those half-way between.
-    """
-    low, high, step, level = -1, len(engine), 1, min(hint, len(engine) - 1)
-    while high - low > 1:
-        if drive_on(rule, engine[level], 0, choices, battery, driven) >= span.end_j:
-            high = level
-        else:
-            low = level
-        if low < 0:
-            level = max(high - step, 0)
-        elif high == len(engine):
-            level = min(low + step, high - 1)
-        else:
-            level = (low + high) // 2
-        step *= 2
-    return high
-
-
-@compiled()
-def neutral_drive(
-    rule: Rule, engine: Indices, hint: int, choices: Choices, span: Span, battery: BatteryArrays
-) -> tuple[RuleDrive, Indices, tuple[int, int]]:
-    """The drive whose charging power ends with enough charge or just more, the engine's entries in it, (time,), and
-    of which level they are before which step; from there on of the one below.
-
-    The lowest level that reaches the charge is kept up to the first step that will do, found by halving, the one
-    below it from there on; where none reaches it, the highest is kept.
-    """
-    steps = len(choices.step_s)
-    driven, tried = at_rest(steps, span.start), at_rest(steps, span.start)
-    level = enough(rule, engine, hint, choices, span, battery, driven)
-    kept = min(level, len(engine) - 1)
-    drive_on(rule, engine[kept], 0, choices, battery, driven)
-    if level == 0 or level == len(engine):
-        return driven, engine[kept], (kept, steps)
-    short, until = 0, steps
-    while until - short > 1:
-        # Up to the step the drive is known.
-        middle = (short + until) // 2
-        tried.energy_j[middle], tried.mode[middle] = driven.energy_j[middle], driven.mode[middle]
-        if drive_on(rule, engine[level - 1], middle, choices, battery, tried) >= span.end_j:
-            until = middle
-        else:
-            short = middle
-    drive_on(rule, engine[level - 1], until, choices, battery, driven)
-    taken = np.concatenate((engine[level, :until], engine[level - 1, until:]))
-    return driven, taken, (level, until)

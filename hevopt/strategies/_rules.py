@@ -26,6 +26,7 @@ from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies import _family_kernels as family
 from hevopt.strategies import _rule_kernels as kernels
 from hevopt.strategies._entries import least_entries, step_minimum
+from hevopt.strategies._neutral_kernels import neutral_drive
 
 _CHARGE_LEVELS, _ASSIST_LEVELS = 41, 20
 # Electric driving stops here where nothing says otherwise: this share of the SOC window above its lower end.
@@ -244,7 +245,7 @@ def calibrated(
     chosen = min(fit, key=lambda n: figure(calibration[n]))
     member, battery = members[chosen], rules.problem.battery.arrays
     rule, middle = rule_for(rules, member.limits), len(member.engine) // 2
-    driven, engine, level = kernels.neutral_drive(
+    driven, engine, level = neutral_drive(
         rule, member.engine, middle, rules.choices, rules.span, battery
     )
     notes = {"calibration": calibration, "chosen": chosen}

@@ -6,6 +6,7 @@ import pytest
 from hevopt import build_problem, load_architecture, load_cycle, simulate
 from hevopt.errors import DataError
 from hevopt.strategies import _family_kernels as family
+from hevopt.strategies import _neutral_kernels as neutral
 from hevopt.strategies import _rule_kernels as kernels
 from hevopt.strategies import conventional
 from hevopt.strategies._rules import ElectricLimits, engine_entries, figures_of, rules_of
@@ -106,9 +107,43 @@ def test_a_level_found_from_any_hint_is_the_lowest_that_is_enough(problem):
     ]
     lowest = next(n for n, end in enumerate(ends) if end >= problem.end_min_j)
     assert 0 < lowest < len(ends) - 1
+    drives = neutral.abreast_at_rest(3, rules.choices.steps, rules.span.start)
     for hint in (0, lowest - 1, lowest, lowest + 7, len(ends)):
-        found = kernels.enough(rule, engine, hint, rules.choices, rules.span, battery, driven)
+        found, of_level, of_below = neutral.enough(
+            rule, engine, hint, rules.choices, rules.span, battery, drives
+        )
         assert found == lowest
+        # Driven abreast or alone, a drive is the same to the bit.
+        assert drives.energy_j[of_level, -1] == ends[lowest]
+        assert drives.energy_j[of_below, -1] == ends[lowest - 1]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.9])
+def test_the_charging_power_changes_at_the_first_step_that_leaves_enough(problem, share):
+    rules = rules_of(problem)
+    engine, steps = engine_entries(rules), rules.choices.steps
+    row = np.array([problem.window_j[0], 4000.0, 20.0])
+    rule, battery = family.rule_of(rules.steps, row), problem.battery.arrays
+    span = rules.span
+    driven = kernels.at_rest(steps, span.start)
+
+    def end_of(level, until):
+        kernels.drive_on(rule, engine[level], 0, rules.choices, battery, driven)
+        return kernels.drive_on(rule, engine[level - 1], until, rules.choices, battery, driven)
+
+    # Ends asked from just above that of a level to just below that of the next one.
+    level = 30
+    ends = end_of(level, 0), end_of(level, steps - 1)
+    span = span._replace(end_j=ends[0] + share * (ends[1] - ends[0]))
+    found, entries, (kept, until) = neutral.neutral_drive(
+        rule, engine, 7, rules.choices, span, battery
+    )
+    assert kept == level
+    assert end_of(level, until) >= span.end_j > end_of(level, until - 1)
+    assert found.energy_j[-1] == end_of(level, until)
+    assert np.array_equal(found.energy_j, driven.energy_j)
+    assert np.array_equal(found.entry, driven.entry)
+    assert np.array_equal(entries, np.append(engine[level, :until], engine[level - 1, until:]))
 
 
 def test_members_do_not_depend_on_who_is_judged_before_them(problem):
@@ -121,3 +156,24 @@ def test_members_do_not_depend_on_who_is_judged_before_them(problem):
     ]
     forth, back = (figures_of(rules, some, engine) for some in (limits, limits[::-1]))
     assert np.array_equal(forth, back[::-1])
+
+
+def test_load_points_are_those_of_least_cost_that_charge_enough(problem):
+    rules = rules_of(problem)
+    choices, charge_w, nox = rules.choices, rules.charge_w, rules.steps.nox_kg
+    cap = float(np.median(nox / choices.spread(choices.step_s)))
+    # Costs in coarse steps, so that many are the same: of these the first counts.
+    choices = choices._replace(cost_kg=np.round(choices.cost_kg, 4))
+    found = kernels.load_point_choices(choices, nox, rules.fired, charge_w, cap)
+    for k in range(0, choices.steps, 37):
+        mine = [i for i in range(*choices.first[k, [0, -1]]) if rules.fired[i]]
+        within = [i for i in mine if nox[i] <= cap * choices.step_s[k]]
+        for level, charge in enumerate(charge_w):
+            able = [i for i in within if choices.power_w[i] <= -charge]
+            if able:
+                expected = min(able, key=lambda i: choices.cost_kg[i])
+            elif within:
+                expected = min(within, key=lambda i: (choices.power_w[i], choices.cost_kg[i]))
+            else:
+                expected = min(mine, key=lambda i: (nox[i], choices.cost_kg[i]), default=-1)
+            assert found[level, k] == expected
