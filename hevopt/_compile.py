@@ -9,18 +9,23 @@ that is spoilt, or older than any of the loops, is passed over and replaced by w
 """
 
 import hashlib
+import os
 import pickle
 import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from fnmatch import fnmatch
+from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from llvmlite import binding
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env
 from numba.core.runtime import rtsys
@@ -45,14 +50,29 @@ def compiled(
     def decorate(function: _Loop) -> _Loop:
         loop: Any = numba.njit(inline=inline, nogil=nogil, error_model="numpy")(function)
         if isinstance(loop, Dispatcher):
-            try:
-                loop._cache = _Cache(function)  # type: ignore[attr-defined]
-            except RuntimeError as error:
-                if "no locator available" not in str(error):
-                    raise
+            loop._cache = _LateCache(function)  # type: ignore[attr-defined]
         return cast(_Loop, loop)
 
     return decorate
+
+
+class _LateCache:
+    """A loop's cache, whose place is looked for when the loop is first called: most of a command's never are."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    @cached_property
+    def _cache(self) -> Any:
+        try:
+            return _Cache(self._function)
+        except RuntimeError as error:
+            if "no locator available" not in str(error):
+                raise
+        return NullCache()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
@@ -70,12 +90,69 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         # can be compiled.
         with suppress(Exception):
             rtsys.initialize(target_context)
-            return self._load_overload(sig, target_context)
+            kept = self._cache_file.load(self._index_key(sig, target_context.codegen()))
+            return None if kept is None else _rebuilt(target_context, *kept)
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         with suppress(OSError):
             super().save_overload(sig, data)
+
+
+class _Loaded(JITCodeLibrary):  # type: ignore[misc]
+    """The machine code of a loop from the disk; what others that are compiled later take over is read for them."""
+
+    bitcode = b""
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = binding.parse_bitcode(self.bitcode)
+        return super()._get_module_for_linking()
+
+
+def _rebuilt(
+    target_context: Any,
+    library_data: tuple[str, str, tuple[bytes, bytes]],
+    described: Any,
+    environment: Environment,
+    signature: Any,
+    objectmode: bool,
+    lifted: Any,
+    annotation: str,
+    reload_init: Any,
+    referenced: Any,
+) -> CompileResult:
+    """A loop of what numba keeps of it, as numba itself rebuilds it, but for the names of all that its code holds,
+    which takes numba longer than all else: the one that is called will do."""
+    for refresh in reload_init or ():
+        refresh()
+    (name, _, (code, bitcode)), codegen = library_data, target_context.codegen()
+    library = _Loaded(codegen, name)
+    library.bitcode = bitcode
+    library.enable_object_caching()
+    library._set_compiled_object(code)
+    library._finalize_final_module()
+    codegen._engine._defined_symbols.add(described.llvm_cpython_wrapper_name)
+    loop = target_context.get_executable(library, described, environment)
+    for one in referenced:
+        codegen.set_env(one.env_name, one)
+    return CompileResult(
+        target_context=target_context,
+        typing_context=target_context.typing_context,
+        library=library,
+        environment=environment,
+        entry_point=loop,
+        fndesc=described,
+        type_annotation=annotation,
+        signature=signature,
+        objectmode=objectmode,
+        lifted=lifted,
+        typing_error=None,
+        call_helper=None,
+        metadata=None,
+        reload_init=reload_init,
+        referenced_envs=referenced,
+    )
 
 
 class _Files(IndexDataCacheFile):  # type: ignore[misc]
@@ -127,7 +204,11 @@ def _environment(module: str, constants: list[Any], name: str) -> Any:
 def _loops_digest() -> str:
     """Of the text of all loops: a loop carries those it calls, of other files too, inside."""
     digest = hashlib.sha256()
-    folder = Path(__file__).parent
-    for path in sorted(path for name in _COMPILED_WITH for path in folder.rglob(name)):
+    found = []
+    for folder, folders, names in os.walk(Path(__file__).parent):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        loops = {name for name in names for kind in _COMPILED_WITH if fnmatch(name, kind)}
+        found += [Path(folder, name) for name in loops]
+    for path in sorted(found):
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -52,7 +52,10 @@ _OUT_OF_RANGE = ("greater_than", "greater_than_equal", "less_than", "less_than_e
 class FileModel(BaseModel):
     """Base of all file models: unknown keys and non-finite numbers are errors, no silent conversion."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    # Built when a file is first checked: most models are parts of others, or of files that a command never reads.
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 Model = TypeVar("Model", bound=FileModel)

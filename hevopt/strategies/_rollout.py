@@ -38,8 +38,8 @@ def roll(
     reach: Reach,
     value_kg: Array,
     grid: Grid,
-) -> Indices:
-    """Entries (time,) that follow a value function (time + 1, mode, node)."""
+) -> tuple[Indices, Array]:
+    """Entries (time,) that follow a value function (time + 1, mode, node), and stored energy (time + 1,)."""
     return follow(problem, choices, reach, lambda step: (0, value_kg), grid)
 
 
@@ -49,7 +49,7 @@ def follow(
     reach: Reach,
     block_of: Callable[[int], tuple[int, Array]],
     grid: Grid,
-) -> Indices:
+) -> tuple[Indices, Array]:
     """As `roll`, with a value function that comes by blocks.
 
     block_of: step -> first step of its block, and (step + 1, mode, node) values from there on
@@ -67,7 +67,7 @@ def follow(
         kernels.rollout(choices, begin, value_kg, grid, reach, battery, progress, budget)
     reached, furthest, moves = progress.at
     if reached == steps:
-        return progress.path
+        return progress.path, progress.energy
     where = f"step {furthest} (t = {problem.table.time_s[furthest]:g} s)"
     if moves < budget:
         raise InfeasibleError(

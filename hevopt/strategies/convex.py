@@ -82,7 +82,7 @@ class _Rollouts:
         bend = stiffness * float(price.max()) * away**2 / (2 * _BAND * (high - low))
         value = to_go[:, :, None] - price[:, None, None] * away + bend
         grid = Grid(centre_j + away[0], cell)
-        path = roll(self.problem, self.choices, self.reach, value, grid)
+        path, _ = roll(self.problem, self.choices, self.reach, value, grid)
         control = self.choices.control[path]
         cost_kg, _ = total_cost_kg(self.problem, control)
         if cost_kg < self.best_cost_kg:

@@ -173,7 +173,7 @@ def _solve_on_grid(
     first_grid = grid.low_j[0] + grid.cell_j * np.arange(nodes)
     at_start = values.block_of(0)[1][0, problem.start_mode]
     promised = float(np.interp(problem.start_j, first_grid, at_start))
-    path = follow(problem, setting.every, setting.reach, values.block_of, grid)
+    path, _ = follow(problem, setting.every, setting.reach, values.block_of, grid)
     return path, promised
 
 

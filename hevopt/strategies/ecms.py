@@ -79,14 +79,14 @@ class _Search:
         choices, (low, high) = self.choices, self.problem.window_j
         reach = self.bound_reach if to_the_end else self.free_reach
         grid = Grid(np.full(choices.steps + 1, low), cell_j)
-        path = roll(self.problem, choices, reach, value, grid)
-        control = choices.control[path]
-        cost_kg, energy_j = total_cost_kg(self.problem, control)
+        path, energy_j = roll(self.problem, choices, reach, value, grid)
         surplus = float(energy_j[-1]) - self.problem.end_min_j
-        enough = to_the_end or surplus >= -_ENERGY_ROUNDING * high
-        if enough and cost_kg < self.best_cost_kg:
-            self.best_cost_kg, self.best_control = cost_kg, control
-            self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
+        if to_the_end or surplus >= -_ENERGY_ROUNDING * high:
+            control = choices.control[path]
+            cost_kg, _ = total_cost_kg(self.problem, control)
+            if cost_kg < self.best_cost_kg:
+                self.best_cost_kg, self.best_control = cost_kg, control
+                self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
         return surplus
 
 

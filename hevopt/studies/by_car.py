@@ -75,8 +75,13 @@ class Solving:
         short = len(self.cycle.time_s) <= _FORK_SAMPLES_MAX and 1 < len(cars) <= _FORK_CARS_MAX
         alone = self.others or self.watch.observe is not unobserved
         if may_fork and short and not alone and two_processors():
-            return halves(self._of_car, len(cars), self.tally)
+            return halves(self._of_car, sorted(cars, key=self._work, reverse=True), self.tally)
         return [self._of_car(n) for n in cars]
+
+    def _work(self, n: int) -> tuple[bool, int]:
+        """What grows with the work on a car: whether its gear is free, and how many strategies are asked of it."""
+        car, wanted = self.asked[n]
+        return car.gear == "free", len(wanted)
 
     def _of_car(self, n: int) -> OfCar:
         car, wanted = self.asked[n]

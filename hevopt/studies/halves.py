@@ -6,7 +6,7 @@ import pickle
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
@@ -46,17 +46,21 @@ def two_processors() -> bool:
     return len(os.sched_getaffinity(0)) > 1 if hasattr(os, "sched_getaffinity") else False
 
 
-def halves(work: Callable[[int], _Result], count: int, tally: SharedCount) -> list[_Result]:
+def halves(
+    work: Callable[[int], _Result], order: Sequence[int], tally: SharedCount
+) -> list[_Result]:
     """work(0) to work(count - 1), at most 256; a process forked from this one takes every call that is next when it
     is free.
 
-    Results come back in order, whoever made them, and so does an error: the first that is raised on purpose. What
+    order: of the calls, those that take longest first, so that neither process waits long for the other
+    Results come back by number, whoever made them, and so does an error: the first that is raised on purpose. What
     the other process does not bring back, as where it was killed, is done here.
     """
     from multiprocessing import get_context
 
+    count = len(order)
     tickets, issued = os.pipe()
-    os.write(issued, bytes(range(count)))
+    os.write(issued, bytes(order))
     os.close(issued)
     context = get_context("fork")
     here, there = context.Pipe(duplex=False)

@@ -38,7 +38,7 @@ def test_results_come_back_in_order_from_both_processes() -> None:
         return n * n, os.getpid()
 
     tally = SharedCount()
-    found = halves(work, 12, tally)
+    found = halves(work, range(12), tally)
 
     assert [square for square, _ in found] == [n * n for n in range(12)]
     assert len({process for _, process in found}) == 2
@@ -54,7 +54,7 @@ def test_first_error_in_order_is_raised_whoever_met_it() -> None:
 
     for _ in range(3):
         with pytest.raises(DataError, match="fault 3"):
-            halves(work, 8, SharedCount())
+            halves(work, range(8), SharedCount())
 
 
 def test_what_a_killed_process_does_not_bring_back_is_done_here() -> None:
@@ -66,7 +66,7 @@ def test_what_a_killed_process_does_not_bring_back_is_done_here() -> None:
         time.sleep(0.02)
         return n
 
-    assert halves(work, 6, SharedCount()) == list(range(6))
+    assert halves(work, range(6), SharedCount()) == list(range(6))
 
 
 def test_interrupt_leaves_no_process_behind() -> None:
@@ -79,7 +79,7 @@ def test_interrupt_leaves_no_process_behind() -> None:
         return n
 
     with pytest.raises(KeyboardInterrupt):
-        halves(work, 4, SharedCount())
+        halves(work, range(4), SharedCount())
     assert not multiprocessing.active_children()
 
 
@@ -93,7 +93,7 @@ def work(n):
         os.kill(own, int(sys.argv[1]))
     time.sleep(float(sys.argv[2]))
     return b"more than a pipe holds" * 10_000
-halves(work, 3, SharedCount())
+halves(work, range(3), SharedCount())
 """
 
 
