@@ -22,9 +22,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 import numba
-from llvmlite import binding
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, ll
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.environment import Environment, _rebuild_env
@@ -103,10 +102,11 @@ class _Loaded(JITCodeLibrary):  # type: ignore[misc]
     """The machine code of a loop from the disk; what others that are compiled later take over is read for them."""
 
     bitcode = b""
+    _shared_module: Any
 
     def _get_module_for_linking(self) -> Any:
         if self._shared_module is None:
-            self._shared_module = binding.parse_bitcode(self.bitcode)
+            self._shared_module = ll.parse_bitcode(self.bitcode)
         return super()._get_module_for_linking()
 
 

@@ -79,7 +79,7 @@ def chemical_power_at(power: float, energy: float, battery: BatteryArrays) -> fl
     return chemical_power(power, voltage, discharge, charging, battery.coulombic_efficiency)
 
 
-class Touch(NamedTuple):
+class CurvesAt(NamedTuple):
     """The curves at a stored energy: voltage, resistances, and their slopes by state of charge in the segment."""
 
     voltage: float
@@ -91,12 +91,12 @@ class Touch(NamedTuple):
 
 
 @compiled(inline="always")
-def touch_at(energy: float, battery: BatteryArrays) -> Touch:
+def touch_at(energy: float, battery: BatteryArrays) -> CurvesAt:
     """The curves at a stored energy."""
     i = _segment_at(energy, battery)
     _, voltage, discharge, charging = _state_in(i, energy, battery)
     width = battery.soc[i + 1] - battery.soc[i]
-    return Touch(
+    return CurvesAt(
         voltage,
         discharge,
         charging,
@@ -108,7 +108,7 @@ def touch_at(energy: float, battery: BatteryArrays) -> Touch:
 
 @compiled(inline="always")
 def touching(
-    power: float, touch: Touch, capacity_as: float, efficiency: float
+    power: float, touch: CurvesAt, capacity_as: float, efficiency: float
 ) -> tuple[float, float]:
     """Rate at which stored energy falls, and its derivative by stored energy within the segment.
 

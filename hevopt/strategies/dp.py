@@ -14,11 +14,12 @@ few steps' energy, once more on finer grids.
 The first grid spans the SOC window; the next ones ever narrower bands around the path found. A quick look comes
 before where a gap that is enough is told: a coarse grid over the window and one band, and where a bound does not
 prove that its path keeps to that gap, one band more. Where it does then, as for most cars, there is no other grid.
+Where the bound leaves little more open, as where the window binds a little, bands narrow on while that gains; where
+it leaves much, as in windows that hold few steps' energy, a coarse grid may mislead, and all begins anew.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -42,6 +43,8 @@ _BANDS = (1.0, 0.1, 0.01, 0.003, 0.001)
 _GAIN_WORTH_MORE = 2e-5
 # The grids of a quick look, as shares of window and nodes; the path is tried from the second on.
 _QUICK = ((1.0, 0.25), (0.1, 1.0), (0.01, 1.0))
+# Times the gap that is enough within which what a bound leaves open counts as the bound's own.
+_NEARLY = 4.0
 # Missing charge costs this many times what it is worth.
 _GENTLE, _STEEP = 5.0, 1e4
 # A rollout dearer than promised by this share has been misled.
@@ -72,7 +75,8 @@ def solve(
 ) -> Plan:
     """The plan of least cost on grids of `nodes` stored energies; without `refine`, on the first grid only.
 
-    enough_gap: a share of the cost; a plan of few grids that is proven to be within it of the optimum is taken
+    enough_gap: a share of the cost; a plan of few grids that is proven to be within it of the optimum is taken, and
+    one proven to be within four times as much that narrower grids do not better
     """
     if not 3 <= nodes <= _NODES_MAX:
         raise DataError(f"energy nodes {nodes}; allowed: 3 to {_NODES_MAX}")
@@ -84,23 +88,37 @@ def solve(
         problem, every, without_dominated(every), reach, _GENTLE * worth, hard_top=False
     )
     notes = {"price_kgpj": price, "nodes": nodes}
-    if enough_gap > 0:
-        grids = [(band, max(int(share * nodes), 3)) for band, share in _QUICK]
-        for cost, control, _ in islice(_search(gentle, grids), 1, None):
-            if _proven_gap(problem, control, cost, price) <= enough_gap:
-                return Plan(control, notes)
+    if enough_gap > 0 and refine:
+        looked = _quick_look(gentle, nodes, enough_gap, price)
+        if looked is not None:
+            return Plan(looked, notes)
     bands = _BANDS if refine else _BANDS[:1]
-    *_, (cost, control, promised) = _search(gentle, [(band, nodes) for band in bands])
+    *_, (cost, control, (promised, *_)) = _search(gentle, [(band, nodes) for band in bands])
     steep = _Setting(problem, every, every, reach, _STEEP * worth, hard_top=True)
     for finer in (nodes, min(_FINER * nodes, _NODES_MAX)):
         if cost - promised <= _PROMISE_TOLERANCE * abs(cost):
             break
-        *_, (steep_cost, steep_control, promised) = _search(
+        *_, (steep_cost, steep_control, (promised, *_)) = _search(
             steep, [(band, finer) for band in bands]
         )
         if steep_cost < cost:
             cost, control = steep_cost, steep_control
     return Plan(control, notes)
+
+
+def _quick_look(setting: _Setting, nodes: int, enough_gap: float, price: float) -> Indices | None:
+    """Controls of a plan of few grids proven to be within a gap, or nearly and not to be bettered; None else."""
+    narrower = [(band, 1.0) for band in _BANDS if band < _QUICK[-1][0]]
+    grids = [(band, max(int(share * nodes), 3)) for band, share in (*_QUICK, *narrower)]
+    control = np.empty(0, np.int64)
+    for cost, control, promises in _search(setting, grids):
+        if 1 < len(promises) <= len(_QUICK):
+            gap = _proven_gap(setting.problem, control, cost, price)
+            if gap <= enough_gap:
+                return control
+            if len(promises) == len(_QUICK) and gap > _NEARLY * enough_gap:
+                return None
+    return control
 
 
 def _proven_gap(problem: Problem, control: Indices, cost_kg: float, price: float) -> float:
@@ -114,8 +132,8 @@ def _proven_gap(problem: Problem, control: Indices, cost_kg: float, price: float
 
 def _search(
     setting: _Setting, grids: Sequence[tuple[float, int]]
-) -> Iterator[tuple[float, Indices, float]]:
-    """After every grid: cost and controls of the best path so far, and what the first grid promised.
+) -> Iterator[tuple[float, Indices, list[float]]]:
+    """After every grid: cost and controls of the best path so far, and what each grid promised.
 
     grids: width as a share of the SOC window, and number of nodes
     """
@@ -135,7 +153,7 @@ def _search(
         if cost < best_cost:
             best_cost, best, centre = cost, choices.control[path], energy_j
             switch_j = switched(problem.table, problem.start_mode, best).energy_j
-        yield best_cost, best, promises[0]
+        yield best_cost, best, promises
         if settled:
             break
 

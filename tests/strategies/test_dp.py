@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -155,7 +156,7 @@ def test_a_quick_look_is_taken_only_where_it_is_proven_to_be_enough(problem_of, 
     problem = problem_of(name, "hwfet")
     whole, grids, gaps = simulate(problem, dp.solve(problem).control), [], []
     on_grid, proven_gap = dp._solve_on_grid, dp._proven_gap
-    monkeypatch.setattr(dp, "_solve_on_grid", lambda *args: grids.append(args[3]) or on_grid(*args))
+    monkeypatch.setattr(dp, "_solve_on_grid", lambda *args: grids.append(args) or on_grid(*args))
     monkeypatch.setattr(dp, "_proven_gap", lambda *args: gaps.append(proven_gap(*args)) or gaps[-1])
 
     def looked(gap: float) -> int:
@@ -166,10 +167,17 @@ def test_a_quick_look_is_taken_only_where_it_is_proven_to_be_enough(problem_of, 
         assert quick.cost_kg <= whole.cost_kg * (1 + gap)
         return len(grids)
 
-    assert looked(1e-12) > len(dp._QUICK) and len(gaps) == 2
+    def anew() -> bool:
+        cells = [grid.cell_j for _, grid, *_ in grids]
+        return any(after >= before for before, after in pairwise(cells))
+
+    assert looked(1e-12) > len(dp._QUICK) and len(gaps) == 2 and anew()
     first, second = gaps
     assert second < first and looked((first + second) / 2) == 3
-    assert looked(first) == 2 and grids[0] < grids[1]
+    assert looked(first) == 2 and grids[0][3] < grids[1][3]
+    # Nearly proven: bands narrow on, none begins anew.
+    nearly = looked(second / 2)
+    assert nearly >= len(dp._QUICK) and not anew()
 
 
 def test_order_of_controls_does_not_matter():
