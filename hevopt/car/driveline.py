@@ -55,6 +55,16 @@ class Phase(NamedTuple):
     opened: frozenset[str] = frozenset()
 
 
+class Together(NamedTuple):
+    """Clutches, brakes and one-way clutches that hold together, every other being open.
+
+    engine_on: with the engine turning or at rest; None for both
+    """
+
+    closed: frozenset[str]
+    engine_on: bool | None = None
+
+
 class Use(NamedTuple):
     """A part in a state; gear: its number, or None for the one that the cycle lists."""
 
@@ -70,6 +80,7 @@ class Driveline:
     engine: its shaft, None where there is none; machines: (name, shaft) of each, in the order of the car's
     free_engine_speed: whether an engine that turns apart from the wheels has a speed to choose, not idle speed
     follows_load: whether the machine is an alternator that does nothing but supply the electric load
+    together: what the strategy may close together; empty: whatever it likes
     """
 
     kind: str
@@ -78,6 +89,7 @@ class Driveline:
     machines: tuple[tuple[str, str], ...]
     free_engine_speed: bool = False
     follows_load: bool = False
+    together: tuple[Together, ...] = ()
 
     @property
     def shafts(self) -> tuple[str, ...]:
@@ -132,12 +144,18 @@ class Driveline:
         """Every state: engine turning first. listed: a gear in place of the cycle's."""
         chosen = [box for box in self.boxes if box.choice != "listed"]
         choices = [[(box.name, gear) for gear in box.gears] for box in chosen]
-        switched = [part.name for part in self.parts if _is_switched(part)]
+        switched = [part.name for part in self.parts if is_switched(part)]
         for engine_on in (True, False) if self.engine else (False,):
             for gears in product(*choices):
                 for closed in product((False, True), repeat=len(switched)):
                     names = frozenset(n for n, shut in zip(switched, closed, strict=True) if shut)
-                    yield State(engine_on, gears, names, listed)
+                    if self._may(engine_on, names):
+                        yield State(engine_on, gears, names, listed)
+
+    def _may(self, engine_on: bool, closed: frozenset[str]) -> bool:
+        return not self.together or any(
+            closed == one.closed and one.engine_on in (None, engine_on) for one in self.together
+        )
 
     def uses(self, state: State, phase: Phase) -> tuple[Use, ...]:
         """The parts that join shafts in a state and phase."""
@@ -184,6 +202,7 @@ def _geared(box: Gearbox, state: State, phase: Phase) -> Use | None:
     return Use(box, "gear", None) if phase.box == box.name else None
 
 
-def _is_switched(part: Part) -> bool:
+def is_switched(part: Part) -> bool:
+    """Whether the strategy opens and closes a part."""
     of_strategy = isinstance(part, Clutch) and part.operation == "strategy"
     return of_strategy or isinstance(part, ShaftBrake | OneWayClutch)

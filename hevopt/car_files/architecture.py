@@ -132,10 +132,11 @@ class ArchitectureFile(FileModel):
         given = {key for key in keys if getattr(self, key) is not None}
         kind = self.coupling.kind
         if "source" in given:
-            if "engine" in given or kind != "series":
+            if "engine" in given or not (kind == "series" or self.coupling.engine_apart):
                 raise ValueError(
-                    "a source gives electricity alone: it takes the engine's place in coupling kind 'series', with "
-                    f"machine as its converter; found kind {kind!r}{' and an engine' if 'engine' in given else ''}"
+                    "a source gives electricity alone: it takes the engine's place in coupling kind 'series', or "
+                    "in parts on a shaft that no part joins, with one machine there as its converter; found kind "
+                    f"{kind!r}{' and an engine' if 'engine' in given else ''}"
                 )
             given = given - {"source"} | {"engine"}
         if kind == "parts":

@@ -5,13 +5,25 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import ConfigDict, Field, model_validator
 
 from hevopt.car.templates import CouplingKind
-from hevopt.car_files.fields import Fraction, KeysOfKind, Name, Ratio, ShiftFuel
+from hevopt.car_files.fields import (
+    Fraction,
+    KeysOfKind,
+    List,
+    Name,
+    Number,
+    Ratio,
+    Shape,
+    ShiftFuel,
+)
 from hevopt.files.toml import FileModel
 
 PartKind = Literal[
     "gear", "gearbox", "clutch", "one_way_clutch", "planetary", "shaft_brake", "torque_converter"
 ]
 Ratios = Annotated[list[Ratio], Field(min_length=1, max_length=20)]
+GearNumbers = Annotated[
+    list[Annotated[int, Field(ge=1, le=20)]], Field(min_length=1, max_length=20)
+]
 
 _KEYS_OF_PART = KeysOfKind(
     {
@@ -24,8 +36,8 @@ _KEYS_OF_PART = KeysOfKind(
         "torque_converter": {"first", "second"},
     },
     {
-        "gear": {"efficiency"},
-        "gearbox": {"ratios", "efficiency", "shift_fuel_g"},
+        "gear": {"efficiency", "speed_max_rpm"},
+        "gearbox": {"ratios", "efficiency", "shift_fuel_g", "gears", "preselected"},
         "one_way_clutch": {"second"},
         "planetary": {"efficiency"},
     },
@@ -46,14 +58,47 @@ class PartFile(FileModel):
     carrier: Name | None = None
     ratio: Ratio | None = None
     ratios: Ratios | None = None
-    efficiency: Fraction = 1.0
+    efficiency: Annotated[Annotated[Fraction, Number] | Annotated[list[Fraction], List], Shape] = (
+        1.0
+    )
+    speed_max_rpm: Annotated[float, Field(ge=1, le=1e6)] | None = None
+    gears: GearNumbers | None = None
+    preselected: bool = False
     operation: Literal["driver", "strategy"] | None = None
     shift_fuel_g: ShiftFuel = 0.0
 
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:
-        _KEYS_OF_PART.check(self.kind, self.model_fields_set - {"kind", "name"})
+        given = self.model_fields_set
+        _KEYS_OF_PART.check(self.kind, given - {"kind", "name"})
+        listed = sorted(given & {"gears", "preselected"})
+        if self.ratios is not None and listed:
+            raise ValueError(f"with ratios of its own it does not use {', '.join(listed)}")
+        if self.kind == "gearbox" and self.ratios is None and "efficiency" in given:
+            raise ValueError("without ratios the efficiency is that of the architecture's gearbox")
+        if "shift_fuel_g" in given and self.ratios is None and not self.preselected:
+            raise ValueError("shift_fuel_g is of gears that the strategy chooses; these are listed")
+        if self.preselected and self.gears is None:
+            raise ValueError("preselected needs gears, those among the architecture's gearbox")
+        if isinstance(self.efficiency, list) and self.ratios is None:
+            raise ValueError("one efficiency is needed, as there is one ratio")
+        if isinstance(self.efficiency, list) and len(self.efficiency) != len(self.ratios or ()):
+            raise ValueError(
+                f"efficiency has {len(self.efficiency)} values; ratios has {len(self.ratios or ())}"
+            )
         return self
+
+    @property
+    def efficiencies(self) -> tuple[float, ...]:
+        """One for all its gears, or one per gear."""
+        return (self.efficiency,) if isinstance(self.efficiency, float) else tuple(self.efficiency)
+
+
+class StateFile(FileModel):
+    """What is closed together, everything else that the strategy closes being open."""
+
+    closed: Annotated[list[Name], Field(max_length=40)]
+    engine: Literal["on", "off"] | None = None
 
 
 _KEYS_OF_KIND = KeysOfKind(
@@ -76,7 +121,14 @@ _KEYS_OF_KIND = KeysOfKind(
         "electric": {"final_drive_efficiency"},
         "series_parallel": {"final_drive_efficiency", "lock_up_efficiency"},
         "belt_and_axle": {"axle_efficiency"},
-        "parts": {"engine_shaft", "machine_shaft", "machine_2_shaft", "machine_3_shaft"},
+        "parts": {
+            "engine_shaft",
+            "machine_shaft",
+            "machine_2_shaft",
+            "machine_3_shaft",
+            "states",
+            "follows_load",
+        },
     },
 )
 
@@ -104,7 +156,9 @@ class CouplingFile(FileModel):
     machine_shaft: Name | None = None
     machine_2_shaft: Name | None = None
     machine_3_shaft: Name | None = None
+    follows_load: bool = False
     parts: Annotated[list[PartFile], Field(min_length=1, max_length=40)] | None = None
+    states: Annotated[list[StateFile], Field(min_length=1, max_length=100)] | None = None
 
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:
@@ -113,6 +167,15 @@ class CouplingFile(FileModel):
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"parts: two are called {', '.join(twice)}; give each its own name")
         return self
+
+    @property
+    def engine_apart(self) -> bool:
+        """Whether the parts leave the engine alone on its shaft with one machine."""
+        ends = {
+            end for p in self.parts or () for end in (p.first, p.second, p.sun, p.ring, p.carrier)
+        }
+        beside = [name for name, shaft in self.shafts.items() if shaft == self.engine_shaft]
+        return self.engine_shaft is not None and self.engine_shaft not in ends and len(beside) == 2
 
     @property
     def shafts(self) -> dict[str, str]:

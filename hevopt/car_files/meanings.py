@@ -80,6 +80,9 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "machine_2_shaft": ("", "the same of machine_2"),
         "machine_3_shaft": ("", "the same of machine_3"),
         "parts": ("", "what joins the shafts; a shaft is a name, and the wheels' is wheel; kind parts only"),
+        "states": ("", "what the strategy may close together; left out: any of its clutches and brakes; kind "
+                   "parts only"),
+        "follows_load": ("", "the machine supplies the electric load and does nothing else; kind parts only"),
     },
     "PartFile": {
         "kind": ("", "gear (a pair of gears, a final drive, an axle), gearbox, clutch, one_way_clutch, planetary, "
@@ -93,9 +96,18 @@ MEANINGS: dict[str, dict[str, tuple[str, str]]] = {
         "ratio": ("-", "speed of first over that of second; of a planetary set teeth of the ring over the sun's"),
         "ratios": ("-", "of a gearbox whose gear the strategy chooses, or neutral; without them it is the "
                    "architecture's gearbox, in the gear that the cycle lists"),
-        "efficiency": ("-", "share of the power that it passes on; of a planetary set, of the rolling power"),
+        "efficiency": ("-", "share of the power that it passes on; of a planetary set, of the rolling power; of a "
+                       "gearbox with ratios also one per gear"),
+        "speed_max_rpm": ("1/min", "speed of first above which a coupling of its own opens; gear only"),
+        "gears": ("", "numbers of the architecture's gearbox that are in this one, as in a dual clutch gearbox; "
+                  "gearbox without ratios only"),
+        "preselected": ("", "the strategy chooses among gears until the cycle lists one of them"),
         "operation": ("", "whose a clutch is: driver's (slips at launches, open in neutral), or strategy's"),
-        "shift_fuel_g": ("g", "fuel that a change of gear counts; gearbox with ratios only"),
+        "shift_fuel_g": ("g", "fuel that a change of gear counts; gearbox with ratios, or preselected"),
+    },
+    "StateFile": {
+        "closed": ("", "names of the strategy's clutches, brakes and one-way clutches that hold; others are open"),
+        "engine": ("", "on or off; left out: both"),
     },
     "CarFile": {
         "name": _NAME,

@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 
-from hevopt.car.driveline import Driveline, Phase
+from hevopt.car.driveline import Driveline, Phase, Together, is_switched
 from hevopt.car.parts import (
     WHEEL,
     Clutch,
     Gear,
     Gearbox,
+    GearChoice,
     OneWayClutch,
     Part,
     Planetary,
@@ -33,8 +35,14 @@ def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
     engine = shafts.get("engine")
     line = Driveline("parts", parts, engine, machines)
     driven = bool(line.driver_clutches) or line.converter is not None
-    line = replace(line, free_engine_speed=engine is not None and not driven)
+    line = replace(
+        line,
+        free_engine_speed=engine is not None and not driven,
+        follows_load=data.follows_load,
+        together=_together(data, parts, engine),
+    )
     _check_joined(parts, shafts)
+    _check_gears(line, gearbox)
     check_converter(line, gearbox)
     if engine is None and (chosen := [part.name for part in parts if _is_chosen(part)]):
         raise DataError(
@@ -43,8 +51,67 @@ def driveline_of(data: CouplingFile, gearbox: GearboxData | None) -> Driveline:
         )
     for state in line.states():
         for phase in _phases(line):
-            way(line, state, phase)
+            try:
+                way(line, state, phase)
+            except DataError as error:
+                raise DataError(f"{error}{_left_out(line)}") from None
     return line
+
+
+def _left_out(line: Driveline) -> str:
+    """What a message on a state that cannot be driven adds where a file may leave the state out."""
+    if not any(map(is_switched, line.parts)):
+        return ""
+    return "; or leave the state out: list those that the car uses in coupling.states"
+
+
+def _together(
+    data: CouplingFile, parts: tuple[Part, ...], engine: str | None
+) -> tuple[Together, ...]:
+    """What may be closed together; DataError for names of no such part, and an engine that never turns."""
+    names = [part.name for part in parts if is_switched(part)]
+    for state in data.states or ():
+        if unknown := sorted(set(state.closed) - set(names)):
+            raise DataError(
+                f"driveline: states: {', '.join(unknown)} is nothing that the strategy closes; allowed: "
+                f"{', '.join(names) or 'none, as there is no such part'}"
+            )
+    turning = {"on": True, "off": False}
+    found = tuple(
+        Together(frozenset(state.closed), turning.get(state.engine or ""))
+        for state in data.states or ()
+    )
+    wanted = engine is not None
+    if found and not any(one.engine_on in (None, wanted) for one in found):
+        raise DataError(
+            f"driveline: states: the engine is {'off' if wanted else 'on'} in all of them"
+            f"{'' if wanted else ', and there is none'}; list one with engine = {'on' if wanted else 'off'!r}"
+        )
+    return found
+
+
+def _check_gears(line: Driveline, gearbox: GearboxData | None) -> None:
+    """DataError where a listed gear is in two gearboxes or in none, or an alternator is not alone."""
+    boxes = [box for box in line.boxes if box.choice != "free"]
+    if boxes and gearbox is not None:
+        for gear in range(1, len(gearbox.ratios)):
+            holding = [box.name for box in boxes if gear in box.gears]
+            if len(holding) != 1:
+                where = f"in both {' and '.join(holding)}" if holding else "in no gearbox"
+                raise DataError(
+                    f"driveline: gear {gear} of {gearbox.name!r} is {where}; say in `gears` which gears each has"
+                )
+        if beyond := sorted(
+            {g for box in boxes for g in box.gears} - set(range(len(gearbox.ratios)))
+        ):
+            raise DataError(
+                f"driveline: gear {beyond[0]}: {gearbox.name!r} has {len(gearbox.ratios) - 1} gears"
+            )
+    if line.follows_load and (len(line.machines) != 1 or line.machines[0][1] != line.engine):
+        raise DataError(
+            "driveline: follows_load is of a car whose only machine is an alternator on the engine's shaft; leave "
+            "it out, or put the machine there"
+        )
 
 
 def check_converter(line: Driveline, gearbox: GearboxData | None) -> None:
@@ -69,7 +136,9 @@ def check_converter(line: Driveline, gearbox: GearboxData | None) -> None:
         wrong = f"its second shaft, {part.second!r}, does not lead to the wheels, or its first does as well"
     elif others := [name for name, shaft in line.machines if shaft not in before]:
         wrong = f"{', '.join(others)} turns behind it or apart from it"
-    elif others := [other.name for other in line.parts if other != part and _is_switched(other)]:
+    elif others := [
+        other.name for other in line.parts if other != part and _is_chosen_or_slips(other)
+    ]:
         wrong = f"{', '.join(others)} would be chosen or slip beside it"
     elif sum(isinstance(other, Gearbox) for other in line.parts) != 1:
         wrong = "it needs one gearbox, and no other"
@@ -80,7 +149,7 @@ def check_converter(line: Driveline, gearbox: GearboxData | None) -> None:
         )
 
 
-def _is_switched(part: Part) -> bool:
+def _is_chosen_or_slips(part: Part) -> bool:
     free = isinstance(part, Gearbox) and part.choice != "listed"
     return free or isinstance(part, Clutch | OneWayClutch | ShaftBrake | TorqueConverter)
 
@@ -107,6 +176,14 @@ def _check_joined(parts: tuple[Part, ...], placed: Mapping[str, str]) -> None:
                 f"driveline: {part.name} turns nothing, as no part joins it to the wheels, "
                 f"{', '.join(placed)}; take it out, or correct a shaft's name"
             )
+    ends = [shaft for part in parts for shaft in part.shafts]
+    for part in parts:
+        for shaft in part.shafts:
+            if ends.count(shaft) == 1 and shaft not in {WHEEL, *placed.values()}:
+                raise DataError(
+                    f"driveline: {part.name} ends at {shaft!r}, on which nothing else is; correct the "
+                    "shaft's name, or take the part out"
+                )
 
 
 def _phases(line: Driveline) -> list[Phase]:
@@ -120,10 +197,11 @@ def _phases(line: Driveline) -> list[Phase]:
 def _part(data: PartFile, gearbox: GearboxData | None) -> Part:
     first, second = data.first or "", data.second or ""
     if data.kind == "gear":
-        return Gear(data.name, first, second, data.ratio or 1.0, data.efficiency)
+        limit = inf if data.speed_max_rpm is None else data.speed_max_rpm * TO_SI["_rpm"][1]
+        return Gear(data.name, first, second, data.ratio or 1.0, data.efficiencies[0], limit)
     if data.kind == "planetary":
         sun, ring, carrier = data.sun or "", data.ring or "", data.carrier or ""
-        return Planetary(data.name, sun, ring, carrier, data.ratio or 1.0, data.efficiency)
+        return Planetary(data.name, sun, ring, carrier, data.ratio or 1.0, data.efficiencies[0])
     if data.kind == "clutch":
         return Clutch(data.name, first, second, data.operation or "strategy")
     if data.kind == "one_way_clutch":
@@ -141,23 +219,17 @@ def _part(data: PartFile, gearbox: GearboxData | None) -> Part:
 
 def _gearbox(data: PartFile, gearbox: GearboxData | None) -> Gearbox:
     """With ratios of its own, gears that the strategy chooses; else the architecture's gearbox, as listed."""
-    first, second = data.first or "", data.second or ""
+    ends, shift_kg = (
+        (data.name, data.first or "", data.second or ""),
+        data.shift_fuel_g * TO_SI["_g"][1],
+    )
     if data.ratios is None:
         if gearbox is None:
             raise DataError(f"{data.name}: give its ratios, or the architecture a gearbox")
-        numbers = tuple(range(1, len(gearbox.ratios)))
+        numbers = tuple(sorted(set(data.gears or range(1, len(gearbox.ratios)))))
         ratios, efficiency = (tuple(map(float, v)) for v in (gearbox.ratios, gearbox.efficiency))
-        return Gearbox(
-            data.name, first, second, ratios, efficiency, numbers, "listed", loss=gearbox.loss
-        )
+        choice: GearChoice = "preselected" if data.preselected else "listed"
+        return Gearbox(*ends, ratios, efficiency, numbers, choice, shift_kg, gearbox.loss)
     numbers = tuple(range(1, len(data.ratios) + 1))
-    return Gearbox(
-        data.name,
-        first,
-        second,
-        (1.0, *data.ratios),
-        (1.0,) + (data.efficiency,) * len(data.ratios),
-        numbers,
-        "free",
-        data.shift_fuel_g * TO_SI["_g"][1],
-    )
+    each = data.efficiencies * (len(data.ratios) // len(data.efficiencies))
+    return Gearbox(*ends, (1.0, *data.ratios), (1.0, *each), numbers, "free", shift_kg)

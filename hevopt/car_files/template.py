@@ -65,10 +65,6 @@ def new_files(
     original = car.source
     contents, texts = read_contents(original), {}
     if parts:
-        if "source" in contents:
-            raise DataError(
-                f"{original}: a source needs coupling kind 'series', which has no parts; leave --parts out"
-            )
         contents = {**contents, "coupling": written_out(car.driveline)}
     references: dict[str, str | dict[str, Any]] = {}
     for key in filter(contents.get, COMPONENTS):

@@ -118,10 +118,23 @@ def test_a_source_drives_no_shaft(tmp_path):
         load_architecture(path)
 
 
-def test_a_car_with_a_source_is_not_written_out_as_parts(tmp_path):
+def test_a_car_with_a_source_is_written_out_as_parts(tmp_path):
+    path, cycle = written(tmp_path), short("udds", 60)
+    ((copy, text),) = new_files("copy", path, tmp_path / "copy.toml", parts=True).items()
+    copy.write_text(text)
+    own, kind = (
+        build_problem(load_architecture(car), cycle, levels=12).table for car in (copy, path)
+    )
+    assert np.array_equal(own.fuel_kg, kind.fuel_kg)
+    assert np.array_equal(own.battery_power_w, kind.battery_power_w)
+    joined = text.replace('"motor"', '"crankshaft"')
+    copy.write_text(joined)
+    with pytest.raises(DataError, match="on a shaft that no part joins, with one machine there"):
+        load_architecture(copy)
+
+
+def test_a_copy_has_the_source_in_a_file_of_its_own(tmp_path):
     path = written(tmp_path)
-    with pytest.raises(DataError, match="leave --parts out"):
-        new_files("copy", path, tmp_path / "copy.toml", parts=True)
     for file, text in new_files("copy", path, tmp_path / "copy.toml", ["source"]).items():
         file.write_text(text)
     assert "kind series; shipped: none" in (tmp_path / "copy.toml").read_text()
