@@ -14,7 +14,7 @@ from hevopt.car.driveline import BRAKE, ENGINE, State
 from hevopt.car.parts import WHEEL
 from hevopt.powertrain.branches import Driven, Piece
 from hevopt.powertrain.cells import cells_of
-from hevopt.powertrain.kinetic import jumps_along
+from hevopt.powertrain.kinetic import jumps_along, left_out_j
 from hevopt.powertrain.operation import Setting, completed, flowing, setting
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.cells import SplitCells, TableFigures
@@ -66,7 +66,8 @@ class PowerFlows(Flows):
     def _names(self) -> tuple[str, ...]:
         own = (f"{name}_{what}" for name in self.machines for what in ("torque_nm", "speed_radps"))
         converter = ("converter_loss_w",) if self.car.converter is not None else ()
-        return (*_NAMES, *converter, *own)
+        free = ("shafts_left_out_j",) if self.car.driveline.free_engine_speed else ()
+        return (*_NAMES, *converter, *free, *own)
 
     def cells(self, figures: TableFigures) -> SplitCells | None:
         return cells_of(self.branches, figures)
@@ -147,6 +148,8 @@ class PowerFlows(Flows):
         if self.car.converter is not None:
             bus_w = found["machine_electric_w"] + found["auxiliary_power_w"]
             found["converter_loss_w"] = self.car.converter.loss_w(bus_w)
+        if self.car.driveline.free_engine_speed:
+            found["shafts_left_out_j"] = left_out_j(self.car, here.way, here.shafts)[:, None]
         for name in self.machines:
             none = np.zeros((1, 1))
             found[f"{name}_torque_nm"] = torques.get(name, none)

@@ -18,9 +18,10 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.parts import WHEEL
+from hevopt.car.ways import Way
 from hevopt.display.facts import Shown
 from hevopt.powertrain.phases import Stretch
-from hevopt.powertrain.shafts import placed, wheel_ratio
+from hevopt.powertrain.shafts import Shafts, placed, wheel_ratio
 from hevopt.problem.arrays import Array, Flags, Indices
 
 # Of a car without machines, whose starter is of its own.
@@ -87,6 +88,22 @@ def kinetic_of(car: Architecture, found: Sequence[Stretch], step_s: Array) -> Ki
                     beside + inertia * (speed + sign * half_s * accel) ** 2 / 2
                 )
     return Kinetic(engine, machines)
+
+
+def left_out_j(car: Architecture, way: Way, shafts: Shafts) -> Array:
+    """(state,) kinetic energy at the steps' mean speeds beyond what is booked: that of engine speeds that are free.
+
+    A machine may turn more slowly by it, so that it may be below 0.
+    """
+    left: Array = np.zeros(len(shafts.step))
+    for owner, inertia, shaft in placed(car):
+        if shaft in shafts.speed_radps:
+            ratio = wheel_ratio(way, shaft, shafts.gear)
+            squares = shafts.speed_radps[shaft] ** 2 - (ratio * shafts.speed_radps[WHEEL]) ** 2
+            if owner is None and shaft in way.held:
+                squares = squares - car.engine.idle_radps**2 * (shafts.speed_radps[shaft] > 0)
+            left = left + inertia * squares / 2
+    return left
 
 
 class Jumps:

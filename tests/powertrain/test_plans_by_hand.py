@@ -1,5 +1,5 @@
-"""Plans of two shipped hybrids in plain numbers, every step from the files: a series-parallel car, and a P2 with dual
-clutch gearbox. What was chosen (engine turning, its speed where free, torques) is the plan's."""
+"""Plans of two shipped hybrids in plain numbers, every step from the files: a series-parallel car and a P2 with a
+dual clutch gearbox. What was chosen (engine turning, its speed where free, torques) is the plan's."""
 
 import tomllib
 from functools import lru_cache

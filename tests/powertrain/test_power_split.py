@@ -1,5 +1,6 @@
 """The input power split as a shipped file: by hand at points, as parts, and solved with a proof."""
 
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -11,6 +12,7 @@ from hevopt.car.driveline import State
 from hevopt.car.parts import WHEEL
 from hevopt.driving.demand import Demand
 from hevopt.files.lookup import shipped_folder
+from hevopt.pages.comparison.energy import LEFT_OUT, energy_of
 from hevopt.powertrain import packing
 from hevopt.powertrain.evaluated import evaluated
 from hevopt.powertrain.operation import completed, setting
@@ -112,6 +114,21 @@ def test_power_is_balanced_and_speeds_are_those_of_willis(highway):
     moving = ring > 0
     assert np.max(np.abs(willis[on | moving])) < 1e-9
     assert (sun[on] < 0).any() and (sun[on] > 0).any()
+
+
+def test_what_changes_of_the_free_speed_would_take_is_told(highway):
+    run, problem = highway.dp_trajectory, highway.problem
+    f, on = run.flows, np.array([problem.table.controls[c].engine_on for c in run.control])
+    engine, sun, ring = (f[f"{n}_speed_radps"] for n in ("engine", "machine", "machine_2"))
+    whole_j = 0.5 * (0.18 * engine**2 + 0.0226 * (sun**2 + ring**2))
+    booked_j = 0.5 * 0.0226 * ((K * ring) ** 2 + ring**2) + on * 0.5 * 0.18 * (1000 * pi / 30) ** 2
+    held_j = whole_j - booked_j
+    np.testing.assert_allclose(f["shafts_left_out_j"], held_j, rtol=1e-9, atol=1e-6)
+    assert np.max(np.abs(held_j[~on])) < 1e-6
+    items = energy_of(run, problem.table.step_s, PRIUS.engine.heating_value_jpkg).of_which
+    (told,) = (item.energy_j for item in items if item.name == LEFT_OUT)
+    up_j = sum(max(after - before, 0.0) for before, after in pairwise([0.0, *held_j, 0.0]))
+    assert told == pytest.approx(up_j, rel=1e-6) and 5e4 < told < 5e5
 
 
 def test_parts_listed_one_by_one_are_the_same_car(tmp_path):

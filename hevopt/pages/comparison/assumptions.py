@@ -4,7 +4,14 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
-from hevopt.pages.comparison.energy import BRAKES, BURNT, OF_STARTS, TAKEN_IN_BRAKING, UNREGAINED
+from hevopt.pages.comparison.energy import (
+    BRAKES,
+    BURNT,
+    LEFT_OUT,
+    OF_STARTS,
+    TAKEN_IN_BRAKING,
+    UNREGAINED,
+)
 from hevopt.pages.comparison.results import Item, Results, SavedRow, Sensitivity
 from hevopt.pages.comparison.saved_car import CarAbout, CarFigures
 from hevopt.pages.comparison.verdict import corrected_cost, cost
@@ -41,6 +48,7 @@ def assumptions(results: Results) -> list[Assumption]:
             "too good, most on short cycles",
         ),
         _starts(known),
+        _free_speeds(known),
         _braking(results, known),
         _gears(known),
         Assumption(
@@ -120,6 +128,25 @@ def _starts(known: list[_Known]) -> Assumption:
         "A start costs fuel and spins the engine up, but no time, comfort or wear.",
         _by_cars(lines),
         "too good",
+    )
+
+
+def _free_speeds(known: list[_Known]) -> Assumption:
+    """What shafts take up where the engine's speed is free: no plan pays for it, nor is it given back."""
+    lines = []
+    for name, car, _, rows in known:
+        energy, best = rows[0].detail.energy if rows[0].detail else None, rows[0]
+        rises_j = 0.0 if energy is None else _energy_j(energy.of_which, LEFT_OUT)
+        if rises_j:
+            worth = rises_j * car.price_kgpj * car.heating_value_jpkg / max(_fuel_j(best), 1e-9)
+            lines.append(
+                f"{name}: in {best.figures.strategy} they rise by {rises_j / 1e3:.0f} kJ in all, worth "
+                f"{100 * worth:.1f} % of its fuel were nothing of it regained"
+            )
+    return Assumption(
+        "An engine whose speed is free changes it at once, and its shafts' energy with it costs nothing.",
+        lines,
+        "too good, most where the plan changes speed often; hevopt drive has it",
     )
 
 

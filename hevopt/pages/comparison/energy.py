@@ -30,6 +30,7 @@ SHAFTS, UNREGAINED = "Spinning shafts", "Spin-up not regained"
 NET_DRAWN = "stored energy drawn, net"
 BURNT, OF_STARTS = "fuel burnt", "fuel of starts and shifts"
 TAKEN_IN_BRAKING = "braking at the wheels"
+LEFT_OUT = "rises of free engine speeds, in no book"
 SPUN_BEFORE, SPUN_AFTER = "Shafts at the start", "Shafts at the end"
 # A share of all energy below which a link is rounding.
 _TINY = 1e-9
@@ -81,8 +82,18 @@ def energy_of(trajectory: Trajectory, step_s: Array, heating_value_jpkg: float) 
                 ("into the battery, at its terminals", -battery),
                 ("out of the battery, at its terminals", battery),
             )
-        ],
+        ]
+        + _left_out(trajectory),
     )
+
+
+def _left_out(trajectory: Trajectory) -> list[Item]:
+    """Kinetic energy that shafts of free speed take up on the way, all rises together, which no plan pays for."""
+    held_j = trajectory.flows.get("shafts_left_out_j")
+    if held_j is None:
+        return []
+    rises = np.maximum(np.diff(held_j, prepend=0.0, append=0.0), 0.0)
+    return [Item(name=LEFT_OUT, energy_j=float(np.sum(rises)))]
 
 
 class _Shafts(NamedTuple):
