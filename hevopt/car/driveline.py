@@ -80,7 +80,7 @@ class Driveline:
     engine: its shaft, None where there is none; machines: (name, shaft) of each, in the order of the car's
     free_engine_speed: whether an engine that turns apart from the wheels has a speed to choose, not idle speed
     follows_load: whether the machine is an alternator that does nothing but supply the electric load
-    together: what the strategy may close together; empty: whatever it likes
+    together: what the strategy may close together, whatever it likes where nothing is listed
     """
 
     kind: str

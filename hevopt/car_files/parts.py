@@ -176,10 +176,10 @@ def _check_joined(parts: tuple[Part, ...], placed: Mapping[str, str]) -> None:
                 f"driveline: {part.name} turns nothing, as no part joins it to the wheels, "
                 f"{', '.join(placed)}; take it out, or correct a shaft's name"
             )
-    ends = [shaft for part in parts for shaft in part.shafts]
+    named = [shaft for part in parts for shaft in part.shafts]
     for part in parts:
         for shaft in part.shafts:
-            if ends.count(shaft) == 1 and shaft not in {WHEEL, *placed.values()}:
+            if named.count(shaft) == 1 and shaft not in {WHEEL, *placed.values()}:
                 raise DataError(
                     f"driveline: {part.name} ends at {shaft!r}, on which nothing else is; correct the "
                     "shaft's name, or take the part out"

@@ -1,5 +1,6 @@
 """Plots as bytes of a file: what a map covers, and a coast-down with its fit. Same data, same bytes."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 # Cells of the plot along each axis, finer than its pixels are wide.
 _CELLS = 500
+# Share of the axes that a label keeps free around it.
+_LABEL_ROOM = 0.06
 
 
 def map_figure(imported: ImportedMap) -> bytes:
@@ -102,4 +105,26 @@ def _efficiency_contours(
     contours = axes.contour(
         speed * RPM_PER_RADPS, torque, shown, levels=levels, colors="#1b5e20", linewidths=0.8
     )
-    axes.clabel(contours, fmt=lambda value: f"{value:.0%}", fontsize=8)
+    size = np.array([np.ptp(speed) * RPM_PER_RADPS, np.ptp(torque)])
+    lines = [line / size for level in contours.allsegs for line in level]
+    places = [place * size for place in label_places(lines)]
+    axes.clabel(contours, fmt=lambda value: f"{value:.0%}", fontsize=8, manual=places)
+
+
+def label_places(lines: Sequence[Array]) -> list[Array]:
+    """A point of each line, (point, 2) with y = 0 at no torque, for its label; none for a line that has no room.
+
+    Near the line's middle, away from other labels and from no torque, where a machine's lines crowd.
+    """
+    places: list[Array] = []
+    for line in lines:
+        inner = line[len(line) // 8 : len(line) - len(line) // 8]
+        if not len(inner) or np.hypot(*np.ptp(line, axis=0)) < 2 * _LABEL_ROOM:
+            continue
+        room = np.abs(inner[:, 1])
+        for place in places:
+            room = np.minimum(room, np.hypot(*(inner - place).T))
+        if room.max() >= _LABEL_ROOM:
+            wide = np.flatnonzero(room >= min(2 * _LABEL_ROOM, room.max()))
+            places.append(inner[wide[len(wide) // 2]])
+    return places

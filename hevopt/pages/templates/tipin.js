@@ -60,7 +60,10 @@
       });
     }));
     const cells = rows * (columns === 1 ? 2 : 1);
-    return { height: 60 + 280 * cells, data: traces, layout: layout(look, width, { ...own, annotations: titles, grid: { rows: cells, columns, pattern: "independent", xgap: 0.14, ygap: 0.28 }, margin: { l: 62, r: 14, t: 12, b: 48 } }) };
+    // The library gives a legend no more than half the height, and lets what is left of it cover the plots.
+    const longest = Math.max(...data.cases.map((c) => c.label.length)), each = Math.max(1, Math.floor((width - 76) / (36 + 6.7 * longest)));
+    const legend = 29 * Math.ceil(traces.filter((one) => one.showlegend).length / each);
+    return { height: Math.max(60 + 280 * cells + legend, 40 + 2 * legend), data: traces, layout: layout(look, width, { ...own, annotations: titles, grid: { rows: cells, columns, pattern: "independent", xgap: 0.14, ygap: 0.28 }, margin: { l: 62, r: 14, t: 12, b: 48 } }) };
   }
 
   function compressor(look, width) {

@@ -5,6 +5,7 @@ import pytest
 from map_bench import RPM, car_with, write
 
 from hevopt import load_architecture
+from hevopt.measured.maps.plot import label_places
 
 MACHINE = load_architecture("C2").machines[0]
 LIKE = ("--like", "machine_flywheel_18kw")
@@ -96,3 +97,16 @@ def test_efficiency_above_all_is_named_with_its_line_and_how_it_was_read(hevopt)
     seen = hevopt(*IMPORT)
     assert seen.status == 2 and "line 6: efficiency up to 1.04; allowed: up to 1" in seen.err, seen
     assert "efficiency [%] in % (header)" in seen.err
+
+
+def test_labels_of_lines_that_meet_at_no_torque_stand_apart():
+    along = np.linspace(0, 1, 200)
+    lines = [np.stack([along, sign * level / (0.02 + along)], axis=1)
+             for sign in (1, -1) for level in (0.002, 0.004, 0.008, 0.016)]  # fmt: skip
+    places = label_places([*lines, np.array([[0.5, 0.5], [0.51, 0.5]]), np.empty((0, 2))])
+    assert len(places) >= 2
+    for n, (x, y) in enumerate(places):
+        assert abs(y) >= 0.06 and any(np.min(np.hypot(*(line - (x, y)).T)) < 1e-9 for line in lines)
+        assert all(np.hypot(x - u, y - v) >= 0.06 for u, v in places[:n])
+    wide = [np.array([[0, h], [0.3, h], [0.5, h], [0.7, h], [1, h]]) for h in (0.3, 0.6, -0.4)]
+    assert [tuple(place) for place in label_places(wide)] == [(0.5, 0.3), (0.5, 0.6), (0.5, -0.4)]

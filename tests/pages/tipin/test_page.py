@@ -1,6 +1,7 @@
 """The page of a tip-in study: its figures are the study's, and a browser draws them all."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from diesels import shipped
@@ -63,3 +64,20 @@ def test_every_figure_is_drawn_and_nothing_leaves_the_screen(made, opened, width
     )
     assert page.evaluate("document.documentElement.scrollWidth") == width
     assert found.trouble == []
+
+
+def test_a_legend_of_many_cases_leaves_the_plots_their_room(made, opened, tmp_path):
+    car = load_architecture("C2")
+    study = Manoeuvre(car, mean_value_of("C2", car.contents["engine"]), 40 / 3.6, 4)
+    base, other, _ = made[1]
+    cases = (replace(other.case, label=f"smoke limit {1.4 + 0.01 * n:g}") for n in range(22))
+    path = tmp_path / "many.html"
+    path.write_text(
+        tipin_page(study, [base, *(replace(other, case=c) for c in cases)], {}, [], "x")
+    )
+    page = opened(path, viewport={"width": 400, "height": 900}).page
+    until(page, "document.querySelectorAll('#overlay .main-svg').length > 0")
+    whole, shown, above = page.evaluate(
+        "(l => [l.legend._height, l.legend._effHeight, l._size.t])(document.getElementById('overlay')._fullLayout)"
+    )
+    assert 200 < whole <= shown and whole <= above
