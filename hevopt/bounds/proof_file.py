@@ -2,12 +2,17 @@
 
 Two files hold a proof. The table, `NAME.table.npz`: arrays of the controls, of switching and of the battery, in
 NumPy's own format. The proof, `NAME.proof.json`: the claim, the prices (or, of the lower-bound DP, nodes and slope,
-from which it is computed again), the table's digest, and the plan beside it. `tools/check_proof.py` reads them.
+from which it is computed again), and the table's digest. `tools/check_proof.py` reads them.
 
-The scope says of what the claim speaks: of the table's controls, or of every split between them. For that the
-table holds virtual controls, too, which a bound counts and no plan may choose, and what is taken off every cost of
-a step (virtual.py). Who checks the proof trusts these arrays as he trusts the others: that they stand for what lies
-between the levels is shown in hevopt's own code, from the laws of the car, and not in the file.
+The controls are entries, one for each step at which one can be used; `tabulated` marks those that a bound on the
+table's own controls counts: all but those that would move more stored energy than the window holds. Where the
+scope is every split between the levels, `split` marks those that count, virtual ones among them, which no plan may
+choose, and split_slack_kg is taken off every cost of a step (virtual.py). Who checks the proof trusts these arrays
+as he trusts the others: that they stand for what lies between the levels is shown in hevopt's own code, from the
+laws of the car, and not in the file.
+
+The battery is its curves at points of stored energy, cut to the granted window: U² is linear between two points,
+as U is in charge, and a resistance lies between those of the two, so that the lesser is a bound on it.
 
 The digest is SHA-256 over the arrays by name, in alphabetic order, each as "name dtype shape" and its bytes.
 What is claimed is the certificate's bound less its own rounding allowance twice more, as who checks it rounds as
@@ -23,53 +28,84 @@ from numpy.typing import NDArray
 
 from hevopt.bounds.certificate import Certificate, Proof
 from hevopt.bounds.lower_dp import slope_kgpj
-from hevopt.bounds.prices import EPSILON
+from hevopt.bounds.prices import EPSILON, bounded_choices
+from hevopt.bounds.step_prices import CELLS, STRAIGHT
 from hevopt.bounds.virtual import split_of
+from hevopt.problem.battery import energy_j, states
 from hevopt.problem.once import once
 from hevopt.problem.problem import Problem, Trajectory
 
-FORMAT = 2
+FORMAT = 3
+# Share of the most stored energy by which points stand beside an energy that is known.
+_NEAR = 1e-13
 
 
 def table_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
     """The arrays of a problem that a proof speaks of, by name in alphabetic order.
 
-    cost_kg, power_w, usable: (time, control); mode: (control,); step_s: (time,); switch_*: (mode, mode) or (time,
-    mode, mode); of the battery its curves over soc, capacity_as, coulombic_efficiency and window; the start.
-    virtual_*: (entry,) step, mode, cost and power of virtual controls; virtual_slack_kg: (time,) what is taken off
-    the costs of a step, where these count; all empty where nothing is known of what lies between the levels
+    step, mode, cost_kg, power_w, tabulated, split: (entry,) see above; split_slack_kg, step_s: (time,)
+    switch_*: (mode, mode) or (time, mode, mode); start_mode, start_j, coulombic_efficiency: ()
+    energy_j, open_circuit_v, discharge_ohm, charge_ohm: (point,) of the battery
     """
-    table, pack = problem.table, problem.battery
-    arrays = {
-        "cost_kg": problem.cost_kg,
-        "power_w": table.battery_power_w,
-        "usable": table.reject == 0,
-        "mode": table.mode,
+    table = problem.table
+    arrays = _entry_arrays(problem) | _battery_arrays(problem)
+    arrays |= {
         "step_s": table.step_s,
         "switch_fuel_kg": table.switch_fuel_kg,
         "switch_energy_j": table.switch_energy_j,
         "switch_allowed": table.switch_allowed,
         "start_mode": np.int64(problem.start_mode),
-        "soc_start": np.float64(problem.soc_start),
+        "start_j": np.float64(problem.start_j),
     }
-    arrays |= _virtual_arrays(problem)
-    for name in (
-        "soc", "open_circuit_v", "discharge_ohm", "charge_ohm", "capacity_as", "coulombic_efficiency",
-        "soc_min", "soc_max",
-    ):  # fmt: skip
-        arrays[name] = np.asarray(getattr(pack, name), dtype=np.float64)
     return {name: np.asarray(arrays[name], order="C") for name in sorted(arrays)}
 
 
-def _virtual_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
-    split, none = split_of(problem), np.zeros(0)
-    if split is None:
-        own = none.astype(np.int64), none.astype(np.int64), none, none, none
-    else:
-        step, control, cost_kg, power_w, slack_kg = split.virtual
-        own = step, problem.table.mode[control], cost_kg, power_w, slack_kg
-    names = "step", "mode", "cost_kg", "power_w", "slack_kg"
-    return {f"virtual_{name}": values for name, values in zip(names, own, strict=True)}
+def _entry_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
+    """Usable controls, step by step and in the order of their columns, and after them virtual ones."""
+    table, split = problem.table, split_of(problem)
+    step, control = np.nonzero(table.reject == 0)
+    bounded = bounded_choices(problem)
+    tabulated = np.zeros(table.reject.shape, dtype=bool)
+    tabulated[bounded.spread(np.arange(bounded.steps)), bounded.control] = True
+    cost_kg, power_w = problem.cost_kg[step, control], table.battery_power_w[step, control]
+    own, slack_kg = len(step), np.zeros(len(table.step_s))
+    if split is not None:
+        virtual = split.virtual
+        slack_kg = virtual.slack_kg
+        step, control = np.append(step, virtual.step), np.append(control, virtual.control)
+        cost_kg, power_w = np.append(cost_kg, virtual.cost_kg), np.append(power_w, virtual.power_w)
+    return {
+        "step": step,
+        "mode": table.mode[control],
+        "cost_kg": cost_kg,
+        "power_w": power_w,
+        "tabulated": tabulated[step, control] & (np.arange(len(step)) < own),
+        "split": np.full(len(step), split is not None),
+        "split_slack_kg": slack_kg,
+    }
+
+
+def _battery_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
+    """The curves at their own points within the window and at more, so that each piece can count as one resistance.
+
+    Where resistance changes these are as many as the bounds by prices take; and in any case two very close to each
+    energy with which the first step can begin, known as it is.
+    """
+    pack, inside = problem.battery, problem.battery.within_window()
+    ohms = inside.discharge_ohm, inside.charge_ohm
+    cells = CELLS if any(np.ptp(ohm) > STRAIGHT * ohm.max() for ohm in ohms) else 1
+    even = energy_j(pack, np.linspace(inside.soc[0], inside.soc[-1], cells + 1)[1:-1])
+    low, high = inside.energy_j[[0, -1]]
+    # Of (mode, mode), or of the first step of (time, mode, mode).
+    taken = problem.table.switch_energy_j
+    begins = problem.start_j - taken.reshape(-1, *taken.shape[-2:])[0, problem.start_mode]
+    near = np.concatenate([begins - _NEAR * high, begins + _NEAR * high])
+    points = np.unique(np.concatenate([inside.energy_j, even, near]))
+    points = points[(points >= low) & (points <= high)]
+    curves = states(pack, points)[1:]
+    names = "open_circuit_v", "discharge_ohm", "charge_ohm"
+    arrays = {"energy_j": points} | dict(zip(names, curves, strict=True))
+    return arrays | {"coulombic_efficiency": np.float64(pack.coulombic_efficiency)}
 
 
 @once
@@ -93,8 +129,6 @@ def proof_of(plan: Trajectory, certificate: Certificate) -> dict[str, Any]:
         "scope": str(certificate.claim(kind).scope),
         "proof": str(kind),
         **own,
-        "plan_cost_kg": plan.cost_kg,
-        "plan": plan.control.tolist(),
     }
 
 

@@ -59,7 +59,7 @@ _LP_STEPS, _LP_OVERLAP = 4000, 1000
 # A price by costates lies about so close to that of one multiplier.
 _NEAR = 0.01
 # Share of the highest U² by which a curve may leave a straight line and still be taken for one.
-_STRAIGHT = 1e-7
+STRAIGHT = 1e-7
 
 
 def costate_dual(
@@ -153,8 +153,8 @@ def line_above(inside: BatteryArrays) -> BatteryArrays | None:
     chord = np.interp(energy, energy[[0, -1]], squared[[0, -1]])
     over = squared - chord
     ohms = inside.discharge_ohm, inside.charge_ohm
-    apart = [np.ptp(ohm) > _STRAIGHT * ohm.max() for ohm in ohms]
-    if np.abs(over).max() > _STRAIGHT * squared[-1] or any(apart):
+    apart = [np.ptp(ohm) > STRAIGHT * ohm.max() for ohm in ohms]
+    if np.abs(over).max() > STRAIGHT * squared[-1] or any(apart):
         return None
     raised = np.sqrt(squared[[0, -1]] + max(over.max(), 0.0)) * (1 + 4 * EPSILON)
     width = 2 * (energy[-1] - energy[0]) / (inside.capacity_as * raised.sum())
