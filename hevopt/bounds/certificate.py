@@ -5,13 +5,15 @@ while the rollout's gap is above a target.
 
     one multiplier   one price on stored energy (prices.py)
     costate prices   a price per step, from the costate equation along the rollout (step_prices.py)
-    LP prices        a price per step, from a linear program, where the rollout touches the window (step_prices.py)
+    LP prices        a price per step, from a linear program, where the rollout comes near an end of the window
+                     (step_prices.py)
+    segment prices   a price per step, one price a stretch between moments at such an end (segments.py)
     lower-bound DP   a cost-to-go that is nowhere above the true one, for costs of switching (lower_dp.py)
 
 Where it is known what lies between the levels of a table (virtual.py), a bound by prices holds for every split
 between them; else, as that of the lower-bound DP always, for the table's own controls, and a split between them
 might cost less. Of arrays of which nothing is known it is told what that may come to: by how much the bound of
-every second control lies higher (coarse.py). For every strategy of its scope it holds alike. The first three hold
+every second control lies higher (coarse.py). For every strategy of its scope it holds alike. The first four hold
 for every end charge, moving with it by their price at the end; the last one for the asked end charge or more. Each
 is lowered by what rounding could have added (prices.py, lower_dp.py) and then held against the plan in hand: one
 above it is an error.
@@ -30,6 +32,7 @@ from hevopt.bounds.coarse import COARSE, coarseness_kg, coarseness_text
 from hevopt.bounds.lines import Line
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import EPSILON, end_slack_j, one_price_dual, one_price_lines
+from hevopt.bounds.segments import segment_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.bounds.virtual import split_of
 from hevopt.display.facts import Shown
@@ -38,8 +41,8 @@ from hevopt.problem.problem import Problem, Trajectory
 
 TARGET_GAP = 5e-4
 LOWER_DP_NODES = (16_001, 64_001)
-# Share of the window within which a rollout counts as touching its end.
-_TOUCH = 2e-3
+# Share of the window within which a rollout counts as near its end: one on a grid keeps a little off it.
+_NEAR = 0.02
 
 
 class Proof(StrEnum):
@@ -48,6 +51,7 @@ class Proof(StrEnum):
     ONE_MULTIPLIER = "one multiplier"
     COSTATE_PRICES = "costate prices"
     LP_PRICES = "LP prices"
+    SEGMENT_PRICES = "segment prices"
     LOWER_BOUND_DP = "lower-bound DP"
 
 
@@ -55,6 +59,7 @@ PROOF_WORDS: dict[str, str] = {
     Proof.ONE_MULTIPLIER: "one price on stored energy",
     Proof.COSTATE_PRICES: "one price per step, along the best plan found",
     Proof.LP_PRICES: "one price per step, of a linear program",
+    Proof.SEGMENT_PRICES: "one price per step, of stretches between the window's ends",
     Proof.LOWER_BOUND_DP: "a cost-to-go nowhere above the true one",
 }
 
@@ -204,9 +209,14 @@ def certify(
     _gap(certificate, rollout)
     _try_prices(certificate, Proof.COSTATE_PRICES, lambda: costate_dual(problem, rollout, choices))
     gap = _gap(certificate, rollout)
-    if gap > target_gap and _touches_window(problem, rollout):
+    if gap > target_gap and _near_windows_end(problem, rollout):
         _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout, choices))
         gap = _gap(certificate, rollout)
+        if gap > target_gap:
+            _try_prices(
+                certificate, Proof.SEGMENT_PRICES, lambda: segment_dual(problem, rollout, choices)
+            )
+            gap = _gap(certificate, rollout)
     if gap > target_gap and choices is not None and _proven(problem, rollout, target_gap):
         return certificate
     for nodes in LOWER_DP_NODES:
@@ -246,9 +256,9 @@ def _try_prices(certificate: Certificate, kind: Proof, lines: Callable[[], list[
         certificate.failures[kind] = str(error)
 
 
-def _touches_window(problem: Problem, rollout: Trajectory) -> bool:
+def _near_windows_end(problem: Problem, rollout: Trajectory) -> bool:
     low, high = problem.window_j
-    margin = _TOUCH * (high - low)
+    margin = _NEAR * (high - low)
     return bool((rollout.energy_j < low + margin).any() or (rollout.energy_j > high - margin).any())
 
 

@@ -69,7 +69,7 @@ def costate_dual(
 
     choices: those to count in place of the table's own, as of virtual.py
     """
-    return dual_of_shape(problem, rollout, _costate(problem, rollout), choices)
+    return dual_of_shape(problem, rollout, costate_prices(problem, rollout), choices)
 
 
 def costate_bound_kg(problem: Problem, rollout: Trajectory, end_price_kgpj: float) -> float:
@@ -77,7 +77,7 @@ def costate_bound_kg(problem: Problem, rollout: Trajectory, end_price_kgpj: floa
 
     At most that of the highest line of `costate_dual`, and close to it at the price of one multiplier.
     """
-    choices, priced = _priced(problem, rollout, _costate(problem, rollout))
+    choices, priced = _priced(problem, rollout, costate_prices(problem, rollout))
     scale = end_price_kgpj / priced.end_price if priced.end_price > 0 else 0.0
     at_price = dual_at(problem, choices, priced, scale)
     uphill = scale * (1 + np.sign(at_price.slope_kg) * _NEAR)
@@ -86,11 +86,11 @@ def costate_bound_kg(problem: Problem, rollout: Trajectory, end_price_kgpj: floa
     return max(line.value_kg for line in (at_price, beside, between))
 
 
-def _costate(problem: Problem, rollout: Trajectory) -> Array:
+def costate_prices(problem: Problem, rollout: Trajectory) -> Array:
     """(time,) prices that follow the costate equation along a rollout."""
     inside = problem.battery.within_window()
     return kernels.costate(
-        _between_j(rollout), rollout.battery_power_w, problem.table.step_s, inside
+        after_switching_j(rollout), rollout.battery_power_w, problem.table.step_s, inside
     )
 
 
@@ -128,7 +128,7 @@ def _priced(
     if line is not None:
         window = float(line.energy_j[0]), float(line.energy_j[1])
         worth = kernels.worth_by_tangents(
-            choices, price, start, _between_j(rollout), steep(choices, line), window, line
+            choices, price, start, after_switching_j(rollout), steep(choices, line), window, line
         )
     else:
         cells = window_cells(problem, CELLS)
@@ -138,7 +138,7 @@ def _priced(
     return choices, Priced(worth, before_steps(price), float(constant), float(price[-1]), rounding)
 
 
-def _between_j(rollout: Trajectory) -> Array:
+def after_switching_j(rollout: Trajectory) -> Array:
     """(time,) stored energy between switching and step."""
     return rollout.energy_j[:-1] - rollout.switch_energy_j
 
@@ -185,7 +185,7 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     low, high = problem.window_j
     # Beyond the window, where rounding may lead, a control at the battery's limit may have no current.
     energy_j = np.clip(rollout.energy_j[:-1], low, high)
-    between_j = np.clip(_between_j(rollout), low, high)
+    between_j = np.clip(after_switching_j(rollout), low, high)
     for begin, end in reversed(list(pairwise(ends))):
         reach = min(end + _LP_OVERLAP, choices.steps)
         wanted = (problem.end_min_j, 0.0) if reach == choices.steps else (low, price[reach - 1])

@@ -9,20 +9,21 @@ no s is neutral two neighbouring factors share the cycle, changing once on the w
 that would end short is also tried with the charge made good as late as possible. The cheapest plan tried that
 ends with at least the asked charge is taken.
 
-Where the charge window binds, s jumps: one factor a stretch is found (_segments.py), and their mixed path followed.
+Where the charge window binds, s jumps: one factor a stretch is found (bounds/segments.py), and their mixed path
+followed.
 """
 
 import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
 from hevopt.bounds.prices import before_steps, drain_at_j, one_price_dual, typical_price_kgpj
+from hevopt.bounds.segments import binds, segments
 from hevopt.problem.arrays import Array
 from hevopt.problem.choices import choices_of
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.strategies._rollout import reach_of, roll
 from hevopt.strategies._rollout_kernels import Grid
-from hevopt.strategies._segments import binds, segments
 
 _FACTOR_TOLERANCE = 1e-7
 _BRACKET_STEPS_MAX = 60

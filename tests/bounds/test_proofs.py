@@ -247,7 +247,7 @@ def test_every_rung_is_held_against_the_plan_in_hand(monkeypatch):
     for rung in ("costate_dual", "lp_dual"):
         with monkeypatch.context() as patch:
             patch.setattr(certificate_module, rung, too_high)
-            patch.setattr(certificate_module, "_touches_window", lambda problem, rollout: True)
+            patch.setattr(certificate_module, "_near_windows_end", lambda problem, rollout: True)
             with pytest.raises(SolverError, match="contradicts"):
                 certify(problem, rollout, target_gap=0.0)
     monkeypatch.setattr(certificate_module, "lower_bound_kg", lambda *a, **k: rollout.cost_kg + 1.0)
@@ -271,7 +271,7 @@ def test_a_rung_that_fails_is_named(monkeypatch):
         raise SolverError("HiGHS stopped with status 4")
 
     monkeypatch.setattr(certificate_module, "lp_dual", stopped)
-    monkeypatch.setattr(certificate_module, "_touches_window", lambda problem, rollout: True)
+    monkeypatch.setattr(certificate_module, "_near_windows_end", lambda problem, rollout: True)
     certificate = certify(problem, rollout, target_gap=0.0)
     assert certificate.failures == {"LP prices": "HiGHS stopped with status 4"}
     assert "LP prices" not in certificate.proofs

@@ -9,6 +9,7 @@ from hevopt import Certificate, InfeasibleError, SolverError, certify, simulate
 from hevopt.bounds import certificate as certificate_module
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import end_slack_j, one_price_dual
+from hevopt.bounds.segments import segment_dual
 from hevopt.bounds.step_prices import costate_dual, lp_dual
 from hevopt.problem.problem import Problem
 from hevopt.problem.reject import Reject
@@ -67,6 +68,7 @@ def _rungs(problem, rollout) -> dict[str, Certificate]:
     price = one_price_dual(problem)
     worth, slack = price[-1].price_kgpj, end_slack_j(problem)
     lines = {"one multiplier": price, "costate prices": costate_dual(problem, rollout)}
+    lines["segment prices"] = segment_dual(problem, rollout)
     try:
         lines["LP prices"] = lp_dual(problem, rollout)
     except SolverError as error:

@@ -3,6 +3,11 @@
 With one price on a stretch the path of least cost ends above or below what is asked; two neighbouring prices, one
 of each, are mixed so that it ends there. Where the mix leaves the window most, stored energy is put to the limit
 and the stretch is cut in two, each with a price of its own, until no mix leaves the window.
+
+As prices of a bound they are taken with the drift of the costate equation along a rollout, and first made to jump
+as the multiplier of a limit does, down at the lower one and up at the upper one: of two stretches between which
+they jump the other way, as where a cut leaves one of a single step, the shorter takes the other's price. Any prices
+are valid (step_prices.py).
 """
 
 from typing import NamedTuple
@@ -10,9 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds.lines import Line
+from hevopt.bounds.prices import bounded_choices, drain_at_j, one_price_dual
+from hevopt.bounds.step_prices import after_switching_j, costate_prices, dual_of_shape
 from hevopt.problem.arrays import Array
-from hevopt.problem.choices import Choices
-from hevopt.problem.problem import Problem
+from hevopt.problem.choices import Choices, without_dominated
+from hevopt.problem.problem import Problem, Trajectory
 
 _CUTS_MAX = 60
 _DOUBLINGS_MAX = 40
@@ -33,6 +41,38 @@ class Segments(NamedTuple):
 class _Path(NamedTuple):
     energy_j: Array
     mode: int
+
+
+def segment_dual(
+    problem: Problem, rollout: Trajectory, choices: Choices | None = None
+) -> list[Line]:
+    """Lines of the dual whose prices jump at the window's limits and drift along a rollout, the highest last.
+
+    choices: those to count in place of the table's own, as of virtual.py
+    """
+    own = without_dominated(bounded_choices(problem)) if choices is None else choices
+    low, high = problem.window_j
+    drain_j = drain_at_j(problem, own, np.clip(after_switching_j(rollout), low, high))
+    found = segments(problem, own, drain_j, one_price_dual(problem)[-1].price_kgpj)
+    price = in_order(found, (low + high) / 2) * costate_prices(problem, rollout)
+    return dual_of_shape(problem, rollout, price, choices)
+
+
+def in_order(found: Segments, middle_j: float) -> Array:
+    """(time,) prices that jump down at the lower limit of the window and up at the upper one."""
+    price = found.price_kgpj.copy()
+    while True:
+        begins = np.flatnonzero(np.diff(price)) + 1
+        wrong = (price[begins] > price[begins - 1]) == (found.energy_j[begins] < middle_j)
+        if not wrong.any():
+            return price
+        ends = np.concatenate([[0], begins, [len(price)]])
+        lengths = np.diff(ends)
+        # Jump i stands between the stretches i and i + 1.
+        shorter = np.minimum(lengths[:-1], lengths[1:])
+        jump = int(np.flatnonzero(wrong)[np.argmin(shorter[wrong])])
+        goes, stays = (jump, jump + 1) if lengths[jump] < lengths[jump + 1] else (jump + 1, jump)
+        price[ends[goes] : ends[goes + 1]] = price[ends[stays]]
 
 
 def binds(problem: Problem, choices: Choices, drain_j: Array, cheap: float, dear: float) -> bool:
