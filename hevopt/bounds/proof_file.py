@@ -48,7 +48,7 @@ def table_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
     energy_j, open_circuit_v, discharge_ohm, charge_ohm: (point,) of the battery
     """
     table = problem.table
-    arrays = _entry_arrays(problem) | _battery_arrays(problem)
+    arrays: dict[str, Any] = _entry_arrays(problem) | _battery_arrays(problem)
     arrays |= {
         "step_s": table.step_s,
         "switch_fuel_kg": table.switch_fuel_kg,
