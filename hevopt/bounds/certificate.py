@@ -213,8 +213,11 @@ def certify(
         _try_prices(certificate, Proof.LP_PRICES, lambda: lp_dual(problem, rollout, choices))
         gap = _gap(certificate, rollout)
         if gap > target_gap:
+            beside = certificate.proofs.get(Proof.LP_PRICES, [])
             _try_prices(
-                certificate, Proof.SEGMENT_PRICES, lambda: segment_dual(problem, rollout, choices)
+                certificate,
+                Proof.SEGMENT_PRICES,
+                lambda: segment_dual(problem, rollout, choices, beside),
             )
             gap = _gap(certificate, rollout)
     if gap > target_gap and choices is not None and _proven(problem, rollout, target_gap):

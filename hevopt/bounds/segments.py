@@ -7,9 +7,11 @@ and the stretch is cut in two, each with a price of its own, until no mix leaves
 As prices of a bound they are taken with the drift of the costate equation along a rollout, and first made to jump
 as the multiplier of a limit does, down at the lower one and up at the upper one: of two stretches between which
 they jump the other way, as where a cut leaves one of a single step, the shorter takes the other's price. Any prices
-are valid (step_prices.py).
+are valid (step_prices.py), and a bound is concave in them: the mean of two prices bounds no worse than the mean of
+their bounds, and often better than either.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,18 +46,26 @@ class _Path(NamedTuple):
 
 
 def segment_dual(
-    problem: Problem, rollout: Trajectory, choices: Choices | None = None
+    problem: Problem,
+    rollout: Trajectory,
+    choices: Choices | None = None,
+    beside: Sequence[Line] = (),
 ) -> list[Line]:
     """Lines of the dual whose prices jump at the window's limits and drift along a rollout, the highest last.
 
     choices: those to count in place of the table's own, as of virtual.py
+    beside: lines of other prices, the highest last; then lines of the mean of both are among those found
     """
     own = without_dominated(bounded_choices(problem)) if choices is None else choices
     low, high = problem.window_j
     drain_j = drain_at_j(problem, own, np.clip(after_switching_j(rollout), low, high))
     found = segments(problem, own, drain_j, one_price_dual(problem)[-1].price_kgpj)
     price = in_order(found, (low + high) / 2) * costate_prices(problem, rollout)
-    return dual_of_shape(problem, rollout, price, choices)
+    lines = dual_of_shape(problem, rollout, price, choices)
+    if beside:
+        one, other = (line.scale * line.shape for line in (lines[-1], beside[-1]))
+        lines += dual_of_shape(problem, rollout, (one + other) / 2, choices)
+    return sorted(lines, key=lambda line: line.value_kg)
 
 
 def in_order(found: Segments, middle_j: float) -> Array:

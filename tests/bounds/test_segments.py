@@ -8,6 +8,7 @@ from hevopt import InfeasibleError, build_problem, certify, load_architecture, l
 from hevopt.bounds import certificate as certificate_module
 from hevopt.bounds.certificate import Proof
 from hevopt.bounds.segments import Segments, in_order, segment_dual
+from hevopt.bounds.step_prices import costate_dual
 from hevopt.strategies import dp
 
 
@@ -30,11 +31,31 @@ def test_prices_of_stretches_are_a_bound_on_random_problems():
             rollout = simulate(problem, dp.solve(problem).control)
         except InfeasibleError:
             continue
-        for line in segment_dual(problem, rollout):
+        beside = costate_dual(problem, rollout)
+        lines = segment_dual(problem, rollout, beside=beside)
+        assert lines[-1].value_kg == max(line.value_kg for line in lines)
+        for line in lines:
             above = line.value_kg + line.price_kgpj * (end_j - problem.end_min_j) - cost
             assert above.max() <= 1e-12 * np.abs(cost).max(), seed
         checked += 1
     assert checked > 30
+
+
+def test_the_mean_of_two_prices_bounds_no_worse_than_the_mean_of_their_bounds():
+    better = 0
+    for seed in range(40):
+        problem = random_problem(seed)
+        try:
+            rollout = simulate(problem, dp.solve(problem).control)
+        except InfeasibleError:
+            continue
+        beside, alone = costate_dual(problem, rollout), segment_dual(problem, rollout)
+        both = segment_dual(problem, rollout, beside=beside)
+        assert both[-1].value_kg >= alone[-1].value_kg
+        mean_kg = (alone[-1].value_kg + beside[-1].value_kg) / 2
+        assert both[-1].value_kg >= mean_kg - 1e-12 * rollout.cost_kg, seed
+        better += both[-1].value_kg > max(alone[-1].value_kg, beside[-1].value_kg)
+    assert better > 0
 
 
 @pytest.mark.parametrize(
