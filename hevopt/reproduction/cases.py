@@ -38,11 +38,14 @@ K_AND_STEEP = v.K_PHASES.and_(v.STEEP_NOX, f"{v.K_PHASES.name}, {v.STEEP_NOX.nam
 # What the study's text leaves open, taken together: its start-stop rule and its map, and with them each speed up to
 # which it may drive electrically.
 JOINT_ELECTRIC = tuple(K_AND_STEEP.and_(e, f"both, {e.name}") for e in v.ELECTRIC)
+# What keeps the cars of the study from being better than real ones, taken away: one by one, and all of it.
+PHYSICS = (v.ALL_BRAKING, v.CELLS, v.NO_GAP, v.NO_INERTIA)
+NO_PHYSICS = v.ALL_BRAKING.and_(v.CELLS, "").and_(v.NO_GAP, "").and_(v.NO_INERTIA, "all of them")
 VARIATIONS = (
     v.K_PHASES, v.FREE_STARTS, v.DEAR_STARTS, v.ALTERNATOR, v.NO_INERTIA, v.NO_GAP, v.DRIVELINE, v.MACHINE_LOSS,
     v.CHARGING_LOSS, v.CELLS, v.EACH_WAY, v.RESISTANCE, v.HYBRID_MASS, v.AUXILIARIES, v.ROAD, LOSSES,
     v.STEEP_NOX, K_AND_STEEP,
-    v.ALL_BRAKING, *v.BRAKING, v.NO_RECOVERY, *v.ELECTRIC, *JOINT_ELECTRIC,
+    v.ALL_BRAKING, *v.BRAKING, v.NO_RECOVERY, *v.ELECTRIC, *JOINT_ELECTRIC, NO_PHYSICS,
 )  # fmt: skip
 # Asked of B alone, whose saving is less than the published one.
 VARIATIONS_OF_B = (v.LESS_MACHINE_LOSS, v.LESS_CHARGING_LOSS)

@@ -163,6 +163,24 @@ def test_section_7_has_every_speed_of_section_2_and_picks_none():
     assert {variation.name for variation in v.ELECTRIC} <= set(rows)
 
 
+def test_section_9_says_how_far_each_point_was_moved():
+    heads, _, *rows = next(t for n, t in tables().items() if n.startswith("9."))[0]
+    assert heads[4:] == [
+        "braking shared",
+        "round trip 0.90",
+        "gear changes interrupt",
+        "inertia",
+        "all of it",
+    ]
+    assert [row[0] for row in rows[: len(STATEMENTS)]] == [s.what for s in STATEMENTS]
+    for row in rows:
+        shipped, without, moved = (number(row[n]) for n in (2, 3, 8))
+        assert shipped - without == pytest.approx(moved, abs=2 * NEAR)
+    c2 = next(row for row in rows if row[0] == "C2 conventional, fuel")
+    for variation, column in ((v.ALL_BRAKING, 4), (v.CELLS, 5), (v.NO_INERTIA, 7)):
+        assert number(c2[column]) == -number(row_of("2.", variation.name)[3]), variation.name
+
+
 def test_a_variation_that_changes_nothing_in_a_car_is_no_variation_of_it():
     cycle = load_cycle(CYCLE)
     touched = {
