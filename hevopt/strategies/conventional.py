@@ -52,9 +52,10 @@ def start(
     ]
     coarse = [np.unique(np.append(axis[::4], axis[-1])) for axis in axes]
     near = [ElectricLimits(*limits) for limits in product(*coarse)]
-    centre = near[int(np.argmin(_ranked(rules, figures_of(rules, near, engine, quick=True))))]
-    centre, _ = _improved(rules, axes, centre, engine, quick=True)
-    centre, results = _improved(rules, axes, centre, engine, quick=False)
+    quick, exact = _Judged(rules, engine, quick=True), _Judged(rules, engine, quick=False)
+    centre = near[int(np.argmin(_ranked(rules, quick.figures(near))))]
+    centre, _ = _improved(quick, axes, centre)
+    centre, results = _improved(exact, axes, centre)
     family = as_tried(_sections(axes, centre), engine, results)
     own = told(centre).items()
     return calibrated(
@@ -104,14 +105,30 @@ def _axes(rules: Rules) -> list[Array]:
     ]
 
 
+class _Judged:
+    """Figures of members, worked out for each once: lines through two members that differ in one share a line."""
+
+    def __init__(self, rules: Rules, engine: Indices, *, quick: bool) -> None:
+        self.rules, self._engine, self._quick = rules, engine, quick
+        self._found: dict[ElectricLimits, Array] = {}
+
+    def figures(self, limits: Sequence[ElectricLimits]) -> Array:
+        """(member, 4); see `figures_of`."""
+        new = [own for own in dict.fromkeys(limits) if own not in self._found]
+        if new:
+            found = figures_of(self.rules, new, self._engine, quick=self._quick)
+            self._found |= zip(new, found, strict=True)
+        return np.array([self._found[own] for own in limits])
+
+
 def _improved(
-    rules: Rules, axes: Sequence[Array], centre: ElectricLimits, engine: Indices, *, quick: bool
+    judged: _Judged, axes: Sequence[Array], centre: ElectricLimits
 ) -> tuple[ElectricLimits, Array]:
     """A member that none on the lines through it is better than, found from another on, and the figures there."""
     for improved in range(_ROUNDS + 1):
         limits = _sections(axes, centre)
-        results = figures_of(rules, limits, engine, quick=quick)
-        ranks = _ranked(rules, results)
+        results = judged.figures(limits)
+        ranks = _ranked(judged.rules, results)
         best = int(np.argmin(ranks))
         if improved == _ROUNDS or ranks[best] >= ranks[limits.index(centre)]:
             break
