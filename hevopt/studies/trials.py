@@ -12,6 +12,11 @@ _STEEP_NOX = "engine_diesel_1600_steep_nox"
 _LOSSES = ("loss_c0_w", "loss_c1_ws", "loss_c2_ws2", "loss_c3_wpnm2", "loss_map.loss_w")
 
 
+def _of_machines(*keys: str) -> tuple[str, ...]:
+    """Key paths of all machines, which are changed together."""
+    return tuple(f"{name}.{key}" for name in ("machine", "machine_2", "machine_3") for key in keys)
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A figure of a car, or several that are changed together.
@@ -47,8 +52,8 @@ PARAMETERS = (
     ),
     Parameter("auxiliaries", "W", ("car.auxiliary_power_w",)),
     Parameter("driveline efficiency", "share", ("gearbox.efficiency",), step=0.01),
-    Parameter("machine loss", "x as given", tuple(f"machine.{k}" for k in _LOSSES), relative=True),
-    Parameter("machine efficiency", "share", ("machine.efficiency",), step=0.02),
+    Parameter("machine loss", "x as given", _of_machines(*_LOSSES), relative=True),
+    Parameter("machine efficiency", "share", _of_machines("efficiency"), step=0.02),
     Parameter(
         "battery resistance",
         "ohm per cell",
@@ -57,8 +62,8 @@ PARAMETERS = (
     Parameter("coulombic efficiency", "share", ("battery.coulombic_efficiency",), step=0.01),
     Parameter("battery cells in series", "cells", ("battery.cells_in_series",), whole=True),
     Parameter("engine inertia", "kg m²", ("engine.inertia_kgm2",)),
-    Parameter("machine inertia", "kg m²", ("machine.inertia_kgm2",)),
-    Parameter("spin efficiency", "share", ("machine.spin_efficiency",), step=0.05),
+    Parameter("machine inertia", "kg m²", _of_machines("inertia_kgm2")),
+    Parameter("spin efficiency", "share", _of_machines("spin_efficiency"), step=0.05),
     Parameter("fuel of a start", "g", ("engine.start_fuel_g",)),
     Parameter("machine's share of braking", "mean share", ("car.braking.machine_share",)),
     Parameter("gap at a change of gear", "s", ("gearbox.shift_gap_s",), others=(0.0, 1.0)),

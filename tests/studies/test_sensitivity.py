@@ -13,6 +13,7 @@ from hevopt.pages.comparison.saved import load_results
 from hevopt.studies.case import prepare
 from hevopt.studies.sensitivity import effects_on, sensitivities, unsolved
 from hevopt.studies.solved import run_case
+from hevopt.studies.trials import trials_of
 
 
 @cache
@@ -62,6 +63,20 @@ def test_a_car_has_the_parameters_of_its_own_files():
     names = {parameter for _, parameter in of_b()}
     assert "machine efficiency" in names
     assert not names & {"machine loss", "battery cells in series", "battery resistance"}
+
+
+def test_all_machines_of_a_car_are_changed_together():
+    trials = {t.parameter.name: t for t in trials_of(load_architecture("p0_p4_diesel").contents)}
+    low, own, high = trials["spin efficiency"].changes
+    assert (
+        set(low) == {"machine.spin_efficiency", "machine_2.spin_efficiency"} == set(high)
+        and not own
+    )
+    belt, rear = (low[f"{name}.spin_efficiency"] for name in ("machine", "machine_2"))
+    assert belt == pytest.approx(0.64 - 0.05) and rear == pytest.approx(0.85 * belt / 0.64)
+    prius = {t.parameter.name: t for t in trials_of(load_architecture("prius_1998").contents)}
+    less, given, _ = prius["machine loss"].changes
+    assert set(less) == {"machine.loss_map.loss_w", "machine_2.loss_map.loss_w"} and not given
 
 
 def test_what_is_changed_from_the_start_is_the_car_that_is_compared_with():
