@@ -122,10 +122,10 @@ def _mapped(problem: Problem, chain: Chain, ahead: Array, notes: Mapping[str, An
 
 
 def solve(
-    problem: Problem, training: Sequence[Problem], *, nodes: int = ENERGY_NODES,
+    problem: Problem, training: Sequence[Problem] = (), *, nodes: int = ENERGY_NODES,
     memory_s: float = MEMORY_S,
 ) -> Plan:  # fmt: skip
-    """The plan of a policy map learnt from `training`: problems of the same car on other cycles."""
+    """The plan of a policy map learnt from `training`: problems of the same car on other cycles, one at least."""
     stepper = start(problem, training, nodes=nodes, memory_s=memory_s)
     return Plan(driven(problem, stepper)[0], stepper.notes)
 
@@ -222,7 +222,8 @@ def _recovered_jpv2(training: Sequence[Problem]) -> float:
 def _signals(problem: Problem) -> Signals:
     if problem.table.signals is None:
         raise DataError(
-            "sdp needs a table with signals (speed, power): its classes are made of them"
+            "sdp needs a table with signals (speed, power): its classes are made of them; a table of arrays alone "
+            "has none, so solve it with dp, ecms, mpc or a policy of your own"
         )
     return problem.table.signals
 
@@ -234,6 +235,7 @@ def _same_at_every_step(problem: Problem) -> list[Array]:
 
 
 def _check(problem: Problem, training: Sequence[Problem]) -> None:
+    _signals(problem)
     several = isinstance(training, Sequence) and all(isinstance(p, Problem) for p in training)
     if not several or not training:
         found = f"training = {repr(training)[:40]}" if training else "no training"

@@ -168,5 +168,7 @@ def test_what_training_must_be_is_said(problem_of):
     blind = replace(problem, table=replace(problem.table, signals=None))
     with pytest.raises(DataError, match="signals"):
         sdp.solve(problem, [blind])
+    with pytest.raises(DataError, match="of arrays alone has none, so solve it with dp"):
+        sdp.solve(blind)
     with pytest.raises(DataError, match="allowed"):
         sdp.solve(problem, [problem_of("C2", "us06")], memory_s=0.0)

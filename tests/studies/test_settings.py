@@ -454,7 +454,7 @@ def test_what_has_no_meaning_for_a_car_is_left_out_and_said():
         ("dp", {"node": 100}, "solve, dp: setting 'node' not found; close matches: nodes; available: "),
         ("dp", {"nodes": "many"}, "solve, dp: nodes = 'many'; needed: a number"),
         ("ecms", {"nodes": 100}, "solve, ecms: setting 'nodes'; there is none"),
-        ("sdp", {}, "solve, sdp needs training"),
+        ("sdp", {}, "sdp: no training; pass a list of problems of the same car on other cycles"),
         ("mcp", {}, "strategy 'mcp' not found; close matches: mpc"),
     ],
 )  # fmt: skip
