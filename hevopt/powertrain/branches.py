@@ -100,7 +100,7 @@ def _branch(
     found, follows = stretches(car, driver, state), car.driveline.follows_load
     if any(is_gridded(stretch.way, follows_load=follows) for stretch in found):
         return _packed_branch(car, driver, state, found, levels, around)
-    named = labels(follows, state, levels, around)
+    named = labels(car, state, levels, around)
     demand = driver.demand
     shape = len(demand.time_s), len(named)
     fuel, nox, power = (np.zeros(shape) for _ in range(3))

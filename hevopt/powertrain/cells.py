@@ -34,7 +34,6 @@ from hevopt.powertrain.knots import (
     has_engine_map,
     has_machine_map,
     inside,
-    knots_nm,
 )
 from hevopt.powertrain.operation import completed, flowing, setting
 from hevopt.powertrain.split_levels import CellLevels, Sides, Worked, tangents
@@ -82,21 +81,13 @@ def _levels(piece: Piece, first: int, figures: TableFigures) -> CellLevels | Non
     here = setting(piece.here.car, piece.here.way, piece.here.shafts.picked(some))
     low = np.where(usable, torque, np.inf).min(axis=1, keepdims=True)
     high = np.where(usable, torque, -np.inf).max(axis=1, keepdims=True)
-    column = np.broadcast_to(first + np.arange(torque.shape[1]), torque.shape)
-    own = np.ones(torque.shape, dtype=bool)
-    knots = knots_nm(here, name) if name in here.machines else np.zeros((len(some), 0))
-    if knots.shape[1]:
-        # One that is not met, or beyond what can be used, stands once more for the highest.
-        knots = np.where((knots > low) & (knots < high), knots, high)
-        torque = np.hstack([torque, knots])
-        column = np.hstack([column, np.full(knots.shape, first)])
-        own = np.hstack([own, np.zeros(knots.shape, dtype=bool)])
+    # What cannot be used stands in between, where it may be where a map bends, or else beyond.
+    torque = np.where(usable | ((torque > low) & (torque < high)), torque, high + 1.0)
     order = np.argsort(torque, axis=1, kind="stable")
-    torque, column, own = (np.take_along_axis(v, order, axis=1) for v in (torque, column, own))
-    begins = np.zeros_like(own)
-    begins[:, :-1] = (torque[:, :-1] >= low) & (torque[:, 1:] <= high)
-    begins[:, :-1] &= np.diff(torque, axis=1) > 0
-    return CellLevels(here, name, torque, column, own, begins)
+    torque, usable = (np.take_along_axis(v, order, axis=1) for v in (torque, usable))
+    begins = np.zeros_like(usable)
+    begins[:, :-1] = (torque[:, 1:] <= high) & (np.diff(torque, axis=1) > 0)
+    return CellLevels(here, name, torque, first + order, usable, begins)
 
 
 def _cells(levels: CellLevels, figures: TableFigures) -> SplitCells | None:
@@ -115,16 +106,8 @@ def _cells(levels: CellLevels, figures: TableFigures) -> SplitCells | None:
     slack = np.zeros(len(figures.step_s))
     np.maximum.at(slack, step, np.max(burnt.slack * worked.length_s, axis=1))
     first, last = levels.column[state, ends]
-    cells = SplitCells(
-        step[state],
-        first,
-        last,
-        burnt.fuel,
-        burnt.nox,
-        power,
-        slack,
-        ~levels.own[state, ends],
-    )
+    none_apart = np.zeros(ends.shape, dtype=bool)
+    cells = SplitCells(step[state], first, last, burnt.fuel, burnt.nox, power, slack, none_apart)
     if between is None:
         return cells
     return joined(
@@ -134,28 +117,20 @@ def _cells(levels: CellLevels, figures: TableFigures) -> SplitCells | None:
 
 def _worked(levels: CellLevels, figures: TableFigures) -> Worked | None:
     """None where a level is not what the table says."""
-    here, own = levels.here, levels.own
+    here = levels.here
     torques = completed(here, {levels.name: levels.torque_nm})
     found, step = flowing(here, torques), here.shafts.step
     at, length_s = (step[:, None], levels.column), figures.step_s[step][:, None]
     fuel, nox, power = (values[at] for values in figures[:3])
     machines_w = np.broadcast_to(found.machines_w, power.shape)
-    usable = figures.usable[at] & own
-    rest, first = power - machines_w, np.argmax(usable, axis=1)[:, None]
+    usable, rest = levels.usable, power - machines_w
+    first = np.argmax(usable, axis=1)[:, None]
     rest_w = np.take_along_axis(rest, first, axis=1)
     if not _same(usable, fuel - found.fuel_kgps * length_s, fuel) or not _same(
         usable, rest - rest_w, power, _ZEROED_W
     ):
         return None
-    return Worked(
-        np.where(own, fuel, found.fuel_kgps * length_s),
-        np.where(own, nox, found.nox_kgps * length_s),
-        np.where(own, power, machines_w + rest_w),
-        rest_w,
-        torques.get(ENGINE),
-        found,
-        length_s,
-    )
+    return Worked(fuel, nox, power, rest_w, torques.get(ENGINE), found, length_s)
 
 
 def _power_lines(levels: CellLevels, worked: Worked, between: Inside | None) -> Array | None:
@@ -179,12 +154,12 @@ def _touched_w(levels: CellLevels, worked: Worked) -> Array:
 
 
 def _at_knots(levels: CellLevels, worked: Worked, slack: Array) -> SplitCells:
-    """What is at a knot, and at a level where fuel is cut, which what is next to it may jump down to: cells of no
-    width."""
+    """What is at a level that cannot be used, and at one where fuel is cut, which what is next to it may jump down
+    to: cells of no width."""
     within = levels.open.copy()
     within[:, 1:] |= levels.open[:, :-1]
     off: Flags = worked.found.off_engine_map | worked.found.off_machine_map
-    state, level = np.nonzero(within & ~off & (~levels.own | (worked.fuel_kg == 0)))
+    state, level = np.nonzero(within & ~off & (~levels.usable | (worked.fuel_kg == 0)))
     lowered = worked.power_w - _touched_w(levels, worked)[:, None]
     fuel, nox, power = (
         np.broadcast_to(values[state, level], (2, 2, len(state)))

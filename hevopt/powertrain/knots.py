@@ -9,15 +9,17 @@ and no torque at all, as ends of cells: within a cell
    torque (torques.py) and goes one way within a cell: a flow that rises with T is at least what T's own lines give,
    one that falls at least what T's chord gives. No map need be convex for that.
 3. Each line is that through two points inside the cell, a quarter of it from either end, so that a jump at an end
-   (fuel that is cut, a machine that is switched off) does not count as part of the cell. What is at such an end,
-   and at a knot, which is no level of the table, counts by itself.
-Where T turns round within a cell, or passes a knot there, nothing is claimed.
+   (fuel that is cut, a machine that is switched off) does not count as part of the cell. What is at such an end
+   counts by itself.
+Where T turns round within a cell, or passes a knot there, nothing is claimed. All knots are levels of the table
+(levels.py), so that a plan can choose them: the least of what is straight in between stands at one.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import ENGINE
 from hevopt.car.engine_laws import EngineMap
 from hevopt.car.machine_laws import LossMap
@@ -73,13 +75,23 @@ def has_machine_map(here: Setting, name: str) -> bool:
     return isinstance(here.machines[name].loss, LossMap)
 
 
+def knot_count(car: Architecture, *, engine_on: bool) -> int:
+    """How many torques `knots_nm` gives at most, whichever machine is chosen."""
+    maps = [m.loss for m in car.machines if isinstance(m.loss, LossMap)]
+    count = max((len(law.torque_nm) + _edges(law.loss).low.shape[1] + 1 for law in maps), default=0)
+    law = car.engine.law
+    if engine_on and isinstance(law, EngineMap):
+        count += len(law.torque_nm) + _edges(*_burning(law)).low.shape[1] + 2
+    return count
+
+
 def knots_nm(here: Setting, name: str) -> Array:
     """(state, knot) torques of the machine that is chosen where a map bends, NaN where one is not met."""
     states, found = len(here.shafts.step), []
     law = here.machines[name].loss
     if isinstance(law, LossMap):
         speed = here.speed_radps(name)
-        rows = _rows_nm(law.speed_radps, law.torque_nm, law.loss, np.abs(speed))
+        rows = _rows_nm(law.speed_radps, law.torque_nm, _edges(law.loss), np.abs(speed))
         mirrored = np.where((speed < 0)[:, None], -rows, rows)
         found += [mirrored * here.active(name)[:, None], np.zeros((states, 1))]
     if (
@@ -97,21 +109,50 @@ def _engine_knots_nm(here: Setting) -> Array:
     engine, speed, share = here.car.engine, here.engine_radps, here.active(ENGINE)[:, None]
     law = engine.law
     assert isinstance(law, EngineMap)  # asked for where it is
-    known = law.fuel if law.nox is None else law.fuel + law.nox
-    rows = _rows_nm(law.speed_radps, law.torque_nm, known, speed)
+    rows = _rows_nm(law.speed_radps, law.torque_nm, _edges(*_burning(law)), speed)
     drag = np.nan_to_num(engine.drag_nm(speed))[:, None]
     return np.hstack([rows * share, drag * share, here.least_nm[:, None]])
 
 
-def _rows_nm(speeds: Array, torques: Array, values: Array, speed: Array) -> Array:
-    """(state, knot) rows of a map, and where it is not measured all over the slanted edges between them."""
+def _burning(law: EngineMap) -> list[Array]:
+    return [law.fuel] if law.nox is None else [law.fuel, law.nox]
+
+
+class _Edges(NamedTuple):
+    """Slanted edges of a map between two of its speeds, (speed, edge): the row below each, whether it rises with
+    speed, and whether there is one."""
+
+    low: Indices
+    rises: Flags
+    there: Flags
+
+
+def _edges(*maps: Array) -> _Edges:
+    """Of all cells of which three corners are measured, that between the fourth and these (car/grid.py)."""
+    rising, falling = False, False
+    for values in maps:
+        gap = np.isnan(values)
+        corners = np.array([gap[:-1, :-1], gap[1:, 1:], gap[:-1, 1:], gap[1:, :-1]])
+        single = corners.sum(axis=0) == 1
+        falling |= single & corners[:2].any(axis=0)
+        rising |= single & corners[2:].any(axis=0)
+    there = np.hstack([rising, falling])
+    first = np.argsort(~there, axis=1, kind="stable")[:, : there.sum(axis=1).max()]
+    cells = there.shape[1] // 2
+    return _Edges(first % cells, first < cells, np.take_along_axis(there, first, 1))
+
+
+def _rows_nm(speeds: Array, torques: Array, edges: _Edges, speed: Array) -> Array:
+    """(state, knot) rows of a map and, where it is not measured all over, its slanted edges; NaN where none is."""
     rows = np.broadcast_to(torques, (len(speed), len(torques)))
-    if not np.isnan(values).any():
+    if not edges.low.shape[1]:
         return rows
     i = np.clip(np.searchsorted(speeds, speed, "right") - 1, 0, len(speeds) - 2)
     x = ((speed - speeds[i]) / (speeds[i + 1] - speeds[i]))[:, None]
-    low, step = torques[:-1], np.diff(torques)
-    return np.hstack([rows, low + x * step, low + (1 - x) * step])
+    low = edges.low[i]
+    step = torques[low + 1] - torques[low]
+    slanted = torques[low] + np.where(edges.rises[i], x, 1 - x) * step
+    return np.hstack([rows, np.where(edges.there[i], slanted, np.nan)])
 
 
 def inside(here: Setting, name: str, torque_nm: Array, cells: Flags) -> Inside | None:

@@ -3,7 +3,8 @@
 One torque is chosen: a machine's, what the engine's limits and its own leave open, the engine delivering the rest;
 or without an engine that acts, from what meets the demand to none, friction brakes taking the rest while the car
 brakes. Always among the levels of a turning engine: both ends (engine at full load and at its lowest torque), zero
-torque, battery idle, engine at its best efficiency, and fuel cut without friction brakes.
+torque, battery idle, engine at its best efficiency, and fuel cut without friction brakes. Of measured maps of
+engine and machine every torque where they bend (knots.py) is a level as well: between these they are straight.
 """
 
 from collections.abc import Mapping
@@ -11,8 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import ENGINE, State
 from hevopt.display.facts import Shown
+from hevopt.powertrain.knots import knot_count, knots_nm
 from hevopt.powertrain.operation import Setting
 from hevopt.problem.arrays import Array, Flags, Indices
 
@@ -52,19 +55,20 @@ class Levels(Shown):
     repeats: Flags
 
 
-def labels(follows_load: bool, state: State, levels: int, around: Around | None) -> tuple[str, ...]:
+def labels(car: Architecture, state: State, levels: int, around: Around | None) -> tuple[str, ...]:
     """The names of a state's levels."""
-    if follows_load:
+    if car.driveline.follows_load:
         return ("battery idle",)
     named = tuple(f"{share:.3f}" for share in _shares(state, levels))
     special = _SPECIAL_LEVELS if state.engine_on else ()
     added = () if around is None else tuple(f"refined {place:+.2f}" for place in ADDED_PLACES)
-    return (*named, *special, *added)
+    knots = knot_count(car, engine_on=state.engine_on)
+    return (*named, *special, *added, *(f"map knot {n}" for n in range(1, knots + 1)))
 
 
 def levels_of(here: Setting, state: State, levels: int, around: Around | None) -> Levels:
     """The levels of a way of a state, as many as `labels` names."""
-    count = len(labels(here.car.driveline.follows_load, state, levels, around))
+    count = len(labels(here.car, state, levels, around))
     name = here.way.chosen[0] if here.way.chosen else here.way.slack
     if name is None or name == ENGINE:
         return _single(len(here.shafts.step), count)
@@ -83,8 +87,21 @@ def levels_of(here: Setting, state: State, levels: int, around: Around | None) -
     if around is not None:
         added = around.added_nm(state, here.shafts.step, low, high)
         torque = np.column_stack([torque, added])
+    if count > torque.shape[1]:
+        knots, met = _knots(here, name, torque, count - torque.shape[1])
+        repeats[:, torque.shape[1] :] = ~met
+        torque = np.hstack([torque, np.where(met, knots, low[:, None])])
     repeats[high - low <= _TORQUE_TOLERANCE_NM, 1:] = True
     return Levels({name: torque}, repeats)
+
+
+def _knots(here: Setting, name: str, torque: Array, count: int) -> tuple[Array, Flags]:
+    """(state, count) torques where measured maps bend, and which of them lie between the levels given."""
+    knots = np.full((len(torque), count), np.nan)
+    found = knots_nm(here, name)
+    knots[:, : found.shape[1]] = found
+    least, most = np.nanmin(torque, axis=1)[:, None], np.nanmax(torque, axis=1)[:, None]
+    return knots, (knots > least) & (knots < most)
 
 
 def _shares(state: State, levels: int) -> Array:

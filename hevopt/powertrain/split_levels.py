@@ -16,9 +16,9 @@ class Sides(NamedTuple):
 
 
 class CellLevels(NamedTuple):
-    """Levels of a piece by rising torque, knots of maps among them, and their columns in the table, (state, level).
+    """Levels of a piece by rising torque, and their columns in the table, (state, level).
 
-    own: whether it is a level of the table; a knot has a column of the same mode
+    usable: whether it can be used
     open: whether a cell begins at a level: within those that can be used, and not at the highest
     """
 
@@ -26,13 +26,13 @@ class CellLevels(NamedTuple):
     name: str
     torque_nm: Array
     column: Indices
-    own: Flags
+    usable: Flags
     open: Flags
 
 
 class Worked(NamedTuple):
-    """Levels worked out again: fuel, NOx, battery power, (state, level), as in the table where they stand there;
-    power of what is beside the machine, (state, 1), torque of the engine, None without one, and all flows."""
+    """Levels worked out again: fuel, NOx, battery power, (state, level), as in the table; power of what is
+    beside the machine, (state, 1), torque of the engine, None without one, and all flows."""
 
     fuel_kg: Array
     nox_kg: Array

@@ -1,6 +1,7 @@
 """What is claimed between levels where engine and machine are measured maps, against tables of many more levels."""
 
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from hevopt import build_problem, certify, load_architecture, simulate, solve
 from hevopt.bounds.certificate import Scope
 from hevopt.bounds.step_prices import dual_of_shape
 from hevopt.car.engine_laws import EngineMap
+from hevopt.car.grid import interpolated
 from hevopt.car.machine_laws import LossMap
-from hevopt.powertrain import cells
+from hevopt.powertrain import knots, levels
 
 
 def engine_map(engine, rng, noise):
@@ -83,15 +85,15 @@ def test_the_bound_is_near_that_of_many_levels_and_speaks_of_every_split():
 
 def test_maps_without_their_knots_would_be_noticed(monkeypatch):
     none = lambda here, name: np.zeros((len(here.shafts.step), 0))  # noqa: E731
-    monkeypatch.setattr(cells, "knots_nm", none)
+    monkeypatch.setattr(levels, "knots_nm", none)
     assert build_problem(mapped("C2", machine=False), part(*DRIVES["C2"])).table.cells() is None
     _, found = below("C2", mapped("C2", engine=False))
     assert found.below > 1e-8
 
 
 def test_knots_two_per_cent_off_would_be_noticed(monkeypatch):
-    found = cells.knots_nm
-    monkeypatch.setattr(cells, "knots_nm", lambda here, name: 1.02 * found(here, name))
+    found = levels.knots_nm
+    monkeypatch.setattr(levels, "knots_nm", lambda here, name: 1.02 * found(here, name))
     assert build_problem(mapped("C2", machine=False), part(*DRIVES["C2"])).table.cells() is None
     _, found_below = below("C2", mapped("C2", engine=False))
     assert found_below.below > 1e-8
@@ -102,3 +104,55 @@ def test_a_map_whose_engine_has_no_data_where_a_level_stands_is_not_claimed_to_h
     problem, _ = below("C2", mapped("C2", noise=0.0))
     split = problem.table.cells()
     assert np.isfinite(split.fuel_kg).all() and np.isfinite(split.power_w).all()
+
+
+def test_every_knot_within_what_is_open_is_a_level_that_a_plan_may_choose():
+    car = mapped("E", noise=0.0)
+    table = build_problem(car, part(*DRIVES["E"])).table
+    checked = 0
+    for branch in table.flows.branches:
+        for piece in branch.pieces:
+            (name, torque), step = next(iter(piece.given.items())), piece.here.shafts.step
+            given = torque[:, :-1] if name not in piece.here.machines else torque
+            found = knots.knots_nm(piece.here, name)
+            assert found.shape[1] <= knots.knot_count(car, engine_on=branch.state.engine_on)
+            inside = (found > given.min(1)[:, None]) & (found < given.max(1)[:, None])
+            there = (torque[:, None, :] == found[:, :, None]).any(axis=2)
+            assert len(step) == len(found) and there[inside].all()
+            checked += int(inside.sum())
+    assert checked > 500
+
+
+def test_maps_bend_and_end_at_their_knots_and_nowhere_else():
+    """Of a map with scatter, sampled densely at random speeds: second differences, and where data begin or end."""
+    rng = np.random.default_rng(4)
+    speed, torque = np.sort(rng.uniform(50, 500, 7)), np.linspace(-30.0, 200.0, 9)
+    for _ in range(20):
+        values = rng.uniform(1.0, 2.0, (7, 9))
+        values[rng.uniform(size=values.shape) < 0.2] = np.nan
+        at = rng.uniform(speed[0], speed[-1], 20)
+        found = knots._rows_nm(speed, torque, knots._edges(values), at)
+        fine = np.sort(rng.uniform(torque[0], torque[-1], (len(at), 4000)), axis=1)
+        seen = interpolated(speed, torque, values, fine, at[:, None] + 0 * fine)
+        slope = np.diff(seen, axis=1) / np.diff(fine, axis=1)
+        bends = np.abs(np.diff(slope, axis=1)) > 1e-4
+        state, k = np.nonzero(bends)
+        assert len(state)
+        beside = (found[state] >= fine[state, k, None]) & (found[state] <= fine[state, k + 2, None])
+        assert beside.any(axis=1).all()
+        state, k = np.nonzero(np.isnan(seen[:, 1:]) != np.isnan(seen[:, :-1]))
+        beside = (found[state] >= fine[state, k, None] - 1e-6) & (
+            found[state] <= fine[state, k + 1, None] + 1e-6
+        )
+        assert beside.any(axis=1).all()
+
+
+def test_knots_as_levels_leave_a_plan_less_to_miss():
+    car, drive = mapped("C2", noise=0.03), part(*DRIVES["C2"])
+    gaps = []
+    for count in (knots.knot_count, lambda car, engine_on: 0):
+        with mock.patch.object(levels, "knot_count", count):
+            problem = build_problem(car, drive)
+        plan = simulate(problem, solve(problem).control)
+        gaps.append(plan.cost_kg)
+    assert gaps[0] < gaps[1] * (1 - 1e-5)
