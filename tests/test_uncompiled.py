@@ -13,6 +13,7 @@ from forward.plants import body, inputs, one_gear, run, standing
 from problems import random_problem
 
 from hevopt import HevoptError, build_problem, load_architecture, simulate
+from hevopt.bounds import virtual
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual
@@ -38,6 +39,9 @@ def of_bounds() -> list[str]:
         worth = one_price_dual(problem)[-1]
         found += bits([rollout.cost_kg, rollout.end_j, worth.value_kg])
         found += bits(costate_dual(problem, rollout)[-1].value_kg)
+        lines = np.random.default_rng(seed).normal(size=(2, 2, 2, 40)) * [[[[1.0]]], [[[2e4]]]]
+        kg, watts, there = virtual.nodes_of(*lines, virtual.worst_of(problem.battery))
+        found += bits(kg[there]) + bits(watts[there])
         found += bits(lower_bound_kg(problem, worth.price_kgpj, nodes=101))
         choices, low_high = choices_of(problem), np.array(problem.window_j)
         terminal = np.tile(np.linspace(1e-3, 0.0, 31), (choices.modes, 1))

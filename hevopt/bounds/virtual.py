@@ -36,15 +36,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hevopt.bounds._virtual_kernels import Worst, among, nodes
 from hevopt.bounds.prices import EPSILON
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.battery import Battery
 from hevopt.problem.choices import Choices, choices_of, without_dominated
 from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
-
-# Least share of U² that s² may be where a tangent is taken.
-_LEAST_ROOT = 1e-6
 
 
 class Virtual(NamedTuple):
@@ -60,23 +58,15 @@ class Virtual(NamedTuple):
     slack_kg: Array
 
 
-class Worst(NamedTuple):
-    """Least voltage and greatest resistances of the window, and the coulombic efficiency."""
-
-    voltage: float
-    discharge_ohm: float
-    charge_ohm: float
-    efficiency: float
-
-    @classmethod
-    def of(cls, battery: Battery) -> "Worst":
-        inside = battery.within_window()
-        return cls(
-            float(inside.open_circuit_v.min()),
-            float(inside.discharge_ohm.max()),
-            float(inside.charge_ohm.max()),
-            float(inside.coulombic_efficiency),
-        )
+def worst_of(battery: Battery) -> Worst:
+    """Least voltage and greatest resistances of a battery's window."""
+    inside = battery.within_window()
+    return Worst(
+        float(inside.open_circuit_v.min()),
+        float(inside.discharge_ohm.max()),
+        float(inside.charge_ohm.max()),
+        float(inside.coulombic_efficiency),
+    )
 
 
 class Split(NamedTuple):
@@ -98,14 +88,10 @@ def split_of(problem: Problem) -> Split | None:
     control = np.concatenate([real.control, virtual.control])
     cost_kg = np.concatenate([real.cost_kg, virtual.cost_kg]) - virtual.slack_kg[step]
     power_w = np.concatenate([real.power_w, virtual.power_w])
-    block = step * real.modes + table.mode[control]
-    order = np.argsort(block, kind="stable")
-    counts = np.bincount(block, minlength=real.steps * real.modes)
-    ends = np.cumsum(counts).reshape(real.steps, real.modes)
-    first = np.column_stack([ends[:, 0] - counts[:: real.modes], ends])
+    entry, first = among(real.first, virtual.step * real.modes + table.mode[virtual.control])
     # For a moment a choice bears the number of its entry in place of its column.
     choices = without_dominated(
-        real._replace(first=first, control=order, cost_kg=cost_kg[order], power_w=power_w[order])
+        real._replace(first=first, control=entry, cost_kg=cost_kg[entry], power_w=power_w[entry])
     )
     left = choices.control - len(real.control)
     left = np.sort(left[left >= 0])
@@ -120,38 +106,45 @@ def split_of(problem: Problem) -> Split | None:
 
 
 def _virtual_of(problem: Problem) -> Virtual | None:
-    cells = problem.table.cells()
+    table, counts_nox = problem.table, problem.nox_weight != 0
+    cells = table.cells(nox=counts_nox)
     if cells is None:
         return None
-    table = problem.table
-    whole = table.fuel_kg, table.nox_kg, table.battery_power_w * table.step_s[:, None]
-    if not np.allclose(_cost_kg(problem, *whole), problem.cost_kg, rtol=1e-12, atol=0.0):
+    known = _cost_kg(
+        problem, table.fuel_kg, table.nox_kg, table.battery_power_w, table.step_s[:, None]
+    )
+    if known is not problem.cost_kg and not np.allclose(
+        known, problem.cost_kg, rtol=1e-12, atol=0.0
+    ):
         return None  # an objective of which the lines know nothing
-    energy_j = cells.power_w * table.step_s[cells.step]
-    cost = _cost_kg(problem, cells.fuel_kg, cells.nox_kg, energy_j)
-    nodes_kg, nodes_w, needed = nodes_of(cost, cells.power_w, Worst.of(problem.battery))
+    lines = cells.fuel_kg, cells.nox_kg, cells.power_w
+    cost = _cost_kg(problem, *lines, table.step_s[cells.step])
+    nodes_kg, nodes_w, needed = nodes_of(cost, cells.power_w, worst_of(problem.battery))
     for n, column, apart in ((0, cells.low, cells.apart[0]), (3, cells.high, cells.apart[1])):
-        at = cells.step, column
-        below = nodes_kg[n] < problem.cost_kg[at]
-        below |= nodes_w[n] < table.battery_power_w[at]
-        needed[n] &= below | (table.reject[at] != 0) | apart
-    entry, cell = np.nonzero(needed)
+        at = cells.step * table.mode.size + column
+        below = nodes_kg[n] < problem.cost_kg.take(at)
+        below |= nodes_w[n] < table.battery_power_w.take(at)
+        needed[n] &= below | (table.reject.take(at) != 0) | apart
+    entry = np.flatnonzero(needed)
+    cell = entry % len(cells.step)
     return Virtual(
         cells.step[cell],
         cells.low[cell],
-        nodes_kg[entry, cell],
-        nodes_w[entry, cell],
+        nodes_kg.take(entry),
+        nodes_w.take(entry),
         cells.slack_kg * (1.0 + problem.nox_weight),
     )
 
 
-def _cost_kg(problem: Problem, fuel_kg: Array, nox_kg: Array, energy_j: Array) -> Array:
+def _cost_kg(
+    problem: Problem, fuel_kg: Array, nox_kg: Array, power_w: Array, step_s: Array
+) -> Array:
     """What fuel, NOx and energy at the terminals count; of lines below each a line below their sum."""
     cost_kg = fuel_kg
     if problem.nox_weight != 0:
         cost_kg = cost_kg + problem.nox_weight * nox_kg
     if problem.electricity_kgpj != 0:
-        cost_kg = cost_kg + problem.electricity_kgpj * energy_j
+        cost_kg = cost_kg + problem.electricity_kgpj * (power_w * step_s)
     return cost_kg
 
 
@@ -160,60 +153,4 @@ def nodes_of(cost: Array, power: Array, worst: Worst) -> tuple[Array, Array, Fla
 
     cost, power: (line, end, cell)
     """
-    inner = np.sort(_kinks(cost, power), axis=0)
-    place = np.concatenate([np.zeros((1, inner.shape[1])), inner, np.ones((1, inner.shape[1]))])
-    nodes_kg, at_w = (_greater(lines, place) for lines in (cost, power))
-    nodes_w = at_w.copy()
-    middle = (at_w[1] + at_w[2]) / 2
-    found = [_lowered(start, at_w[n], worst) for n, start in ((1, at_w[0]), (2, at_w[3]))]
-    between = [_lowered(middle, at_w[n], worst) for n in (1, 2)]
-    nodes_w[1:3] = np.minimum(found, between)
-    hopeless = ~np.isfinite(nodes_w).all(axis=0)
-    nodes_kg[1:3] -= 4.0 * EPSILON * np.abs(cost).max(axis=(0, 1))
-    nodes_w[1:3] -= 4.0 * EPSILON * np.abs(power).max(axis=(0, 1))
-    nodes_kg[1] = np.where(hopeless, nodes_kg.min(axis=0), nodes_kg[1])
-    nodes_w[1] = np.where(hopeless, at_w.min(axis=0), nodes_w[1])
-    needed = np.ones(nodes_kg.shape, dtype=bool)
-    needed[2] = ~hopeless
-    return nodes_kg, nodes_w, needed
-
-
-def _greater(lines: Array, place: Array) -> Array:
-    """(node, cell) the greater of two lines at places of their cells."""
-    start, end = lines[:, 0], lines[:, 1]
-    at = start[:, None] * (1.0 - place) + end[:, None] * place
-    greater: Array = np.maximum(at[0], at[1])
-    return greater
-
-
-def _kinks(cost: Array, power: Array) -> Array:
-    """(2, cell) where the lines of cost and of power cross; where they do not, at the other's or in the middle."""
-    found = []
-    for lines in (cost, power):
-        before, after = lines[1] - lines[0]
-        crosses = (before < 0) != (after < 0)
-        share = np.divide(before, before - after, out=np.full(before.shape, 0.5), where=crosses)
-        found.append(np.where(crosses, np.clip(share, 0.0, 1.0), np.nan))
-    one, other = found
-    both = np.array([np.where(np.isnan(one), other, one), np.where(np.isnan(other), one, other)])
-    return np.where(np.isnan(both), 0.5, both)
-
-
-def _lowered(touch: Array, power: Array, worst: Worst) -> Array:
-    """(cell,) a power that drains no more than the tangent at `touch` says of `power`; NaN without use."""
-    voltage, discharge, charge, efficiency = worst
-    charging = (touch < 0) | ((touch == 0) & (power < 0))
-    ohm = np.where(charging, charge, discharge)
-    squared = voltage**2 - 4.0 * ohm * touch
-    usable = squared > _LEAST_ROOT * voltage**2
-    squared = np.where(usable, squared, voltage**2)
-    grown = 1.0 + 16.0 * EPSILON * voltage**2 / squared
-    moved = power - grown * ohm * (power - touch) ** 2 / squared
-    stored = np.minimum(moved, 0.0) / efficiency
-    stored = stored - charge * (stored / voltage) ** 2
-    drained = efficiency * np.maximum(moved, 0.0)
-    peak = discharge * drained > voltage**2 / 2
-    drained = np.where(peak, 0.0, drained - discharge * (drained / voltage) ** 2)
-    crossed = np.where(charging, drained, stored)
-    result = np.where(np.where(charging, moved > 0, moved < 0), crossed, moved)
-    return np.where(usable, result, np.nan)
+    return nodes(cost, power, worst, EPSILON)

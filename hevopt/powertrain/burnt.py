@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt.car.driveline import ENGINE
-from hevopt.car.slopes import cut_nm, fuel_slopes, nox_bend, nox_slopes
-from hevopt.powertrain.knots import TOUCH_NM, Inside, has_engine_map
-from hevopt.powertrain.operation import Flowing
+from hevopt.car.slopes import Slopes, cut_nm, fuel_slopes, nox_bend, nox_slopes
+from hevopt.powertrain.knots import TOUCH_NM, Inside, Straight, has_engine_map
 from hevopt.powertrain.split_levels import CellLevels, Sides, Worked, tangents
 from hevopt.problem.arrays import Array, Flags
 
@@ -23,41 +22,45 @@ class BurntLines(NamedTuple):
     slack: Array
 
 
-def burnt_lines(levels: CellLevels, worked: Worked, between: Inside | None) -> BurntLines | None:
-    state, low = np.nonzero(levels.open)
-    length = worked.length_s[state, 0]
+def burnt_lines(
+    levels: CellLevels, worked: Worked, between: Inside | None, *, nox: bool
+) -> BurntLines | None:
+    """The lines of all cells; without `nox` those of NOx are 0. None where something is not shown."""
     if between is not None and has_engine_map(levels.here):
-        return _mapped_lines(levels, worked, between)
-    burnt = _burnt(levels, worked.engine_nm, worked.found)
+        return _mapped_lines(levels, worked, between, nox=nox)
+    burnt = _burnt(levels, worked.engine_nm, nox=nox)
     if burnt is None:
         return None
-    fuel, nox = (
-        tangents(levels, values, Sides(*(side * worked.length_s for side in sides)))
-        for values, sides in ((worked.fuel_kg, burnt.fuel), (worked.nox_kg, burnt.nox))
-    )
-    nox[0, 1] -= burnt.nox_fall[0][state, low] * length
-    nox[1, 0] -= burnt.nox_fall[1][state, low] * length
-    return BurntLines(fuel, np.where(burnt.nox_apart[state, low], 0.0, nox), burnt.slack)
+    sides = Sides(*(side * worked.length_s for side in burnt.fuel))
+    fuel = tangents(levels, worked.fuel_kg, sides)
+    if burnt.nox is None:
+        return BurntLines(fuel, np.zeros(fuel.shape), burnt.slack)
+    length = worked.length_s[levels.state, 0]
+    sides = Sides(*(side * worked.length_s for side in burnt.nox.slopes))
+    lines = tangents(levels, worked.nox_kg, sides)
+    lines[0, 1] -= levels.start(burnt.nox.fall[0]) * length
+    lines[1, 0] -= levels.start(burnt.nox.fall[1]) * length
+    return BurntLines(fuel, np.where(levels.start(burnt.nox.apart), 0.0, lines), burnt.slack)
 
 
-def _mapped_lines(levels: CellLevels, worked: Worked, between: Inside) -> BurntLines | None:
+def _mapped_lines(
+    levels: CellLevels, worked: Worked, between: Inside, *, nox: bool
+) -> BurntLines | None:
     """Of a measured map: straight over the engine's torque, which is convex and goes one way within a cell."""
-    sides, (state, low) = _torque_sides(levels), np.nonzero(levels.open)
+    sides = _torque_sides(levels)
     if sides is None or worked.engine_nm is None:
         return None
-    known = between.known[state, low]
-    turns = (sides.right[state, low] < -TOUCH_NM) & (sides.left[state, low + 1] > TOUCH_NM)
+    known = levels.cell(between.known)
+    turns = (levels.start(sides.right) < -TOUCH_NM) & (levels.end(sides.left) > TOUCH_NM)
     if (turns & known).any():
         return None
-    engine = np.broadcast_to(worked.engine_nm, levels.torque_nm.shape)
-    touching = tangents(levels, engine, sides)
-    chord = np.broadcast_to(engine[state, np.array([low, low + 1])], touching.shape)
-    lines, slack = [], np.zeros(levels.torque_nm.shape)
-    for flow in (between.fuel, between.nox):
-        own = flow.of(state, low)
-        lines.append(
-            own.along(np.where(own.slope >= 0, touching, chord)) * worked.length_s[state, 0]
-        )
+    touching = tangents(levels, worked.engine_nm, sides)
+    chord = np.array([levels.start(worked.engine_nm), levels.end(worked.engine_nm)])
+    lines = np.zeros((2, *touching.shape))
+    slack, length_s = np.zeros(levels.torque_nm.shape), worked.length_s[levels.state, 0]
+    for n, flow in enumerate((between.fuel, between.nox) if nox else (between.fuel,)):
+        own = Straight(*(levels.cell(values) for values in flow))
+        lines[n] = own.along(np.where(own.slope >= 0, touching, chord)) * length_s
         known_slopes = np.where(between.known, np.abs(flow.slope), 0.0)
         values = np.where(between.known, np.abs(flow.value), 0.0)
         rounding = 2 * TOUCH_NM * known_slopes.max(axis=1) + _ROUNDING * values.max(axis=1)
@@ -65,42 +68,53 @@ def _mapped_lines(levels: CellLevels, worked: Worked, between: Inside) -> BurntL
     return BurntLines(lines[0], lines[1], slack)
 
 
-class _Burnt(NamedTuple):
-    """Slopes of fuel and NOx flow; all (state, level), where of cells at their low end.
+class _BurntNox(NamedTuple):
+    """Slopes of NOx flow; fall: what lines from the low and from the high end lose across a cell; apart: cells in
+    which NOx may be none. All (state, level), of cells at their low end."""
 
-    nox_fall: what lines of NOx from the low and from the high end lose across a cell; nox_apart: cells in which NOx
-    may be none; slack: kg/s
-    """
+    slopes: Sides
+    fall: tuple[Array, Array]
+    apart: Flags
+
+
+class _Burnt(NamedTuple):
+    """Slopes of fuel flow and NOx, None where there is none or it is not asked for; slack: (state, level), kg/s."""
 
     fuel: Sides
-    nox: Sides
-    nox_fall: tuple[Array, Array]
-    nox_apart: Flags
+    nox: _BurntNox | None
     slack: Array
 
 
-def _burnt(levels: CellLevels, torque_nm: Array | None, found: Flowing) -> _Burnt | None:
+def _burnt(levels: CellLevels, torque_nm: Array | None, *, nox: bool) -> _Burnt | None:
     here, shape = levels.here, levels.torque_nm.shape
-    none = np.zeros(shape)
     if torque_nm is None or ENGINE not in here.way.active:
-        return _Burnt(Sides(none, none), Sides(none, none), (none, none), none > 1, none)
-    engine, speed, share = here.car.engine, here.engine_radps[:, None], here.active(ENGINE)[:, None]
+        none = np.zeros(shape)
+        return _Burnt(Sides(none, none), None, none)
+    engine, speed = here.car.engine, here.engine_radps[:, None]
     over = _torque_sides(levels)
-    own = np.broadcast_to(torque_nm / share, shape)
+    own = np.broadcast_to(torque_nm / here.active(ENGINE)[:, None], shape)
     fuel = fuel_slopes(engine, own, speed)
     if over is None or fuel is None or np.isnan(own).any():
         return None
     touch = cut_nm(engine) + TOUCH_NM
     slack = 2 * touch * np.maximum(fuel.right, fuel.left)
     fuel_sides = _chained(over, *fuel)
-    if not engine.nox_known:
-        return _Burnt(fuel_sides, Sides(none, none), (none, none), none > 1, slack)
-    nox = nox_slopes(engine, own, speed)
-    if nox is None:
+    if not (nox and engine.nox_known):
+        return _Burnt(fuel_sides, None, slack)
+    rises = nox_slopes(engine, own, speed)
+    if rises is None:
         return None
+    slack = np.maximum(slack, 2 * touch * np.maximum(rises.right, rises.left))
+    return _Burnt(fuel_sides, _burnt_nox(levels, own, over, rises), slack)
+
+
+def _burnt_nox(levels: CellLevels, own: Array, over: Sides, rises: Slopes) -> _BurntNox:
+    """Of NOx whose flow rises with the engine's torque, `own`, its slopes given."""
+    here, engine = levels.here, levels.here.car.engine
+    speed, share = here.engine_radps[:, None], here.active(ENGINE)[:, None]
     width = np.diff(levels.torque_nm, axis=1, append=levels.torque_nm[:, -1:])
     cut = engine.fuel_kgps(own, speed) == 0
-    nox_sides = _chained(over, *(np.where(cut, 0.0, side) for side in nox))
+    sides = _chained(over, *(np.where(cut, 0.0, side) for side in rises))
     right, left = over.right, np.roll(over.left, -1, axis=1)
     after = np.roll(own, -1, axis=1)
     # A torque that falls first and then rises may come to the cut in between.
@@ -110,8 +124,7 @@ def _burnt(levels: CellLevels, torque_nm: Array | None, found: Flowing) -> _Burn
         reached = start + slope * width / share
         bend = nox_bend(engine, np.minimum(start, reached), np.maximum(start, reached), speed)
         fall.append(bend / share * slope**2 * width**2 / 2)
-    slack = np.maximum(slack, 2 * touch * np.maximum(nox.right, nox.left))
-    return _Burnt(fuel_sides, nox_sides, (fall[0], fall[1]), apart, slack)
+    return _BurntNox(sides, (fall[0], fall[1]), apart)
 
 
 def _torque_sides(levels: CellLevels) -> Sides | None:

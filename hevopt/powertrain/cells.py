@@ -31,6 +31,7 @@ from hevopt.powertrain.burnt import burnt_lines
 from hevopt.powertrain.knots import (
     TOUCH_NM,
     Inside,
+    Straight,
     has_engine_map,
     has_machine_map,
     inside,
@@ -46,8 +47,13 @@ _SAME = 1e-12
 _ZEROED_W = 4e-9
 
 
-def cells_of(branches: Sequence[Driven], figures: TableFigures) -> SplitCells | None:
-    """The cells of a table that the branches made; None where a part of it is not shown to be convex."""
+def cells_of(
+    branches: Sequence[Driven], figures: TableFigures, *, nox: bool = True
+) -> SplitCells | None:
+    """The cells of a table that the branches made; None where a part of it is not shown to be convex.
+
+    nox: without it the lines of NOx are 0
+    """
     widths = [len(branch.labels) for branch in branches]
     steps, columns = figures.fuel_kg.shape
     if sum(widths) != columns:
@@ -60,7 +66,7 @@ def cells_of(branches: Sequence[Driven], figures: TableFigures) -> SplitCells | 
             levels = _levels(piece, first, figures)
             if levels is None:
                 continue
-            found = _cells(levels, figures)
+            found = _cells(levels, figures, nox=nox)
             if found is None:
                 return None
             parts.append(found)
@@ -72,47 +78,50 @@ def _levels(piece: Piece, first: int, figures: TableFigures) -> CellLevels | Non
     """The levels at the states of a piece that have more than one to choose; None where no state has."""
     if not piece.given:
         return None
-    (name, torque), step = next(iter(piece.given.items())), piece.here.shafts.step
-    usable = figures.usable[step, first : first + torque.shape[1]]
+    (name, torque), here = next(iter(piece.given.items())), piece.here
+    usable = figures.usable[here.shafts.step, first : first + torque.shape[1]]
     some = np.flatnonzero(usable.sum(axis=1) > 1)
     if not len(some):
         return None
-    torque, usable = torque[some], usable[some]
-    here = setting(piece.here.car, piece.here.way, piece.here.shafts.picked(some))
+    if len(some) < len(usable):
+        torque, usable = torque[some], usable[some]
+        here = setting(here.car, here.way, here.shafts.picked(some))
     low = np.where(usable, torque, np.inf).min(axis=1, keepdims=True)
     high = np.where(usable, torque, -np.inf).max(axis=1, keepdims=True)
     # What cannot be used stands in between, where it may be where a map bends, or else beyond.
     torque = np.where(usable | ((torque > low) & (torque < high)), torque, high + 1.0)
     order = np.argsort(torque, axis=1, kind="stable")
-    torque, usable = (np.take_along_axis(v, order, axis=1) for v in (torque, usable))
+    torque = np.take_along_axis(torque, order, axis=1)
+    usable = np.take_along_axis(usable, order, axis=1)
     begins = np.zeros_like(usable)
-    begins[:, :-1] = (torque[:, 1:] <= high) & (np.diff(torque, axis=1) > 0)
-    return CellLevels(here, name, torque, first + order, usable, begins)
+    begins[:, :-1] = (torque[:, 1:] <= high) & (torque[:, 1:] > torque[:, :-1])
+    begin = np.flatnonzero(begins)
+    return CellLevels(
+        here, name, torque, first + order, usable, begins, begin // torque.shape[1], begin
+    )
 
 
-def _cells(levels: CellLevels, figures: TableFigures) -> SplitCells | None:
+def _cells(levels: CellLevels, figures: TableFigures, *, nox: bool) -> SplitCells | None:
     here, name = levels.here, levels.name
     worked = _worked(levels, figures) if set(here.machines) == {name} else None
     if worked is None:
         return None
     maps = has_engine_map(here) or has_machine_map(here, name)
     between = inside(here, name, levels.torque_nm, levels.open) if maps else None
-    burnt = None if maps and between is None else burnt_lines(levels, worked, between)
+    burnt = None if maps and between is None else burnt_lines(levels, worked, between, nox=nox)
     power = None if burnt is None else _power_lines(levels, worked, between)
     if burnt is None or power is None:
         return None
-    step, (state, low) = here.shafts.step, np.nonzero(levels.open)
-    ends = np.array([low, low + 1])
+    step = here.shafts.step
     slack = np.zeros(len(figures.step_s))
     np.maximum.at(slack, step, np.max(burnt.slack * worked.length_s, axis=1))
-    first, last = levels.column[state, ends]
-    none_apart = np.zeros(ends.shape, dtype=bool)
-    cells = SplitCells(step[state], first, last, burnt.fuel, burnt.nox, power, slack, none_apart)
+    ends = levels.start(levels.column), levels.end(levels.column)
+    none = np.zeros((2, len(levels.low)), dtype=bool)
+    cells = SplitCells(step[levels.state], *ends, burnt.fuel, burnt.nox, power, slack, none)
     if between is None:
         return cells
-    return joined(
-        [cells.kept(between.known[state, low]), _at_knots(levels, worked, slack)], len(slack)
-    )
+    known = cells.kept(levels.cell(between.known))
+    return joined([known, _at_knots(levels, worked, slack)], len(slack))
 
 
 def _worked(levels: CellLevels, figures: TableFigures) -> Worked | None:
@@ -134,14 +143,16 @@ def _worked(levels: CellLevels, figures: TableFigures) -> Worked | None:
 
 
 def _power_lines(levels: CellLevels, worked: Worked, between: Inside | None) -> Array | None:
-    state, low = np.nonzero(levels.open)
-    ends = levels.torque_nm[state, np.array([low, low + 1])]
     if between is not None and has_machine_map(levels.here, levels.name):
-        chord = between.power.of(state, low).along(ends) + worked.rest_w[state, 0]
-        return np.array([chord, chord]) - _touched_w(levels, worked)[state]
+        ends = np.array([levels.start(levels.torque_nm), levels.end(levels.torque_nm)])
+        own = Straight(*(levels.cell(values) for values in between.power))
+        chord = own.along(ends) + worked.rest_w[levels.state, 0]
+        return np.array([chord, chord]) - _touched_w(levels, worked)[levels.state]
     sides = _power_sides(levels)
     lines = None if sides is None else tangents(levels, worked.power_w, sides)
-    return lines if between is None or lines is None else lines - _touched_w(levels, worked)[state]
+    if between is None or lines is None:
+        return lines
+    return lines - _touched_w(levels, worked)[levels.state]
 
 
 def _touched_w(levels: CellLevels, worked: Worked) -> Array:

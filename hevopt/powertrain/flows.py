@@ -69,8 +69,8 @@ class PowerFlows(Flows):
         free = ("shafts_left_out_j",) if self.car.driveline.free_engine_speed else ()
         return (*_NAMES, *converter, *free, *own)
 
-    def cells(self, figures: TableFigures) -> SplitCells | None:
-        return cells_of(self.branches, figures)
+    def cells(self, figures: TableFigures, *, nox: bool = True) -> SplitCells | None:
+        return cells_of(self.branches, figures, nox=nox)
 
     def states(self, control: Indices) -> list[State]:
         """The state of the driveline at each step of a plan."""

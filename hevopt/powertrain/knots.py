@@ -37,12 +37,8 @@ class Straight(NamedTuple):
     value: Array
     slope: Array
 
-    def of(self, state: Indices, cell: Indices) -> "Straight":
-        """Those of some cells."""
-        return Straight(*(values[state, cell] for values in self))
-
     def along(self, torque_nm: Array) -> Array:
-        """(..., state, cell) the quantity at torques."""
+        """The quantity at torques, of as many cells."""
         return self.value + self.slope * (torque_nm - self.at_nm)
 
 

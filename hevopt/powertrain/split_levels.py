@@ -3,9 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hevopt.powertrain.operation import Flowing, Setting
 from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.switching import Number
 
 
 class Sides(NamedTuple):
@@ -20,6 +22,7 @@ class CellLevels(NamedTuple):
 
     usable: whether it can be used
     open: whether a cell begins at a level: within those that can be used, and not at the highest
+    state, low: (cell,) state of each cell, and place of its low end in (state, level) levels taken as one row
     """
 
     here: Setting
@@ -28,6 +31,20 @@ class CellLevels(NamedTuple):
     column: Indices
     usable: Flags
     open: Flags
+    state: Indices
+    low: Indices
+
+    def start(self, values: NDArray[Number]) -> NDArray[Number]:
+        """(cell,) of (state, level) values those at the low end of each cell."""
+        return np.broadcast_to(values, self.open.shape).reshape(-1).take(self.low)
+
+    def end(self, values: NDArray[Number]) -> NDArray[Number]:
+        """(cell,) those at the high end."""
+        return np.broadcast_to(values, self.open.shape).reshape(-1).take(self.low + 1)
+
+    def cell(self, values: NDArray[Number]) -> NDArray[Number]:
+        """(cell,) of (state, level - 1) values between neighbouring levels."""
+        return values.reshape(-1).take(self.low - self.state)
 
 
 class Worked(NamedTuple):
@@ -43,10 +60,11 @@ class Worked(NamedTuple):
     length_s: Array
 
 
-def tangents(levels: CellLevels, values: Array, sides: Sides, fall: Array | float = 0.0) -> Array:
+def tangents(levels: CellLevels, values: Array, sides: Sides) -> Array:
     """(line, end, cell) lines through the ends of cells by their slopes there."""
-    state, low = np.nonzero(levels.open)
-    start, end = values[state, low], values[state, low + 1]
-    width = levels.torque_nm[state, low + 1] - levels.torque_nm[state, low]
-    right, left = sides.right[state, low], sides.left[state, low + 1]
-    return np.array([[start, start + right * width - fall], [end - left * width - fall, end]])
+    lines = np.empty((2, 2, len(levels.low)))
+    lines[0, 0], lines[1, 1] = levels.start(values), levels.end(values)
+    width = levels.end(levels.torque_nm) - levels.start(levels.torque_nm)
+    lines[0, 1] = lines[0, 0] + levels.start(sides.right) * width
+    lines[1, 0] = lines[1, 1] - levels.end(sides.left) * width
+    return lines

@@ -43,10 +43,10 @@ class RepeatedFlows(Flows):
     def along(self, control: Indices) -> dict[str, Array]:
         return self.flows.along(self.columns[control])
 
-    def cells(self, figures: TableFigures) -> SplitCells | None:
+    def cells(self, figures: TableFigures, *, nox: bool = True) -> SplitCells | None:
         times = np.bincount(self.columns)
         first = np.cumsum(times) - times
-        found = self.flows.cells(figures.columns(first))
+        found = self.flows.cells(figures.columns(first), nox=nox)
         return None if found is None else found.repeated(first, times)
 
 

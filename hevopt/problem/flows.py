@@ -20,8 +20,11 @@ class Flows(Mapping[str, Array], Shown):
     def _facts(self) -> dict[str, object]:
         return {"flows": list(self)}
 
-    def cells(self, figures: TableFigures) -> SplitCells | None:
-        """What is known between neighbours of the table whose flows these are; None where nothing is."""
+    def cells(self, figures: TableFigures, *, nox: bool = True) -> SplitCells | None:
+        """What is known between neighbours of the table whose flows these are; None where nothing is.
+
+        nox: without it nothing is said of NOx, whose lines may be 0
+        """
         return None
 
     @abstractmethod

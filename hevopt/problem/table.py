@@ -134,14 +134,16 @@ class ControlTable(Shown):
             between=between,
         )
 
-    def cells(self) -> SplitCells | None:
-        """What is known between neighbouring controls; DataError where what is declared contradicts them."""
+    def cells(self, *, nox: bool = True) -> SplitCells | None:
+        """What is known between neighbouring controls; DataError where what is declared contradicts them.
+
+        nox: without it nothing need be said of NOx, whose lines may be 0"""
         figures = TableFigures(
             self.fuel_kg, self.nox_kg, self.battery_power_w, self.feasible, self.step_s
         )
         if not self.between:
             assert isinstance(self.flows, Flows)  # made so in __post_init__
-            return self.flows.cells(figures)
+            return self.flows.cells(figures, nox=nox)
         # What the battery alone refuses still tells how its neighbours go on.
         given = (self.reject & ~np.uint16(Reject.BATTERY_LIMIT)) == 0
         cells = cells_between(self.between, *figures[:3], given, self.mode)

@@ -7,6 +7,7 @@ from proofs.split import split_faults
 
 from hevopt import Battery, ControlTable, DataError, Problem, certify, simulate, solve
 from hevopt.bounds import virtual
+from hevopt.bounds._virtual_kernels import among
 from hevopt.bounds.certificate import Proof, Scope
 from hevopt.errors import CoarseTableWarning
 from hevopt.problem.battery import chemical_power_w, states
@@ -25,7 +26,7 @@ def test_points_stand_for_any_convex_cell_of_any_battery():
     rng = np.random.default_rng(5)
     for seed in range(120):
         battery = draw(seed).battery
-        worst, (low, high) = virtual.Worst.of(battery), battery.granted_window_j
+        worst, (low, high) = virtual.worst_of(battery), battery.granted_window_j
         most = worst.voltage**2 / (4 * max(worst.discharge_ohm, 1e-12))
         ends = rng.uniform(-3, 0.98, (2, 2, 40)) * min(most, 1e6)
         power = np.minimum(ends, 0.98 * min(most, 1e6))
@@ -46,6 +47,22 @@ def test_points_stand_for_any_convex_cell_of_any_battery():
             for price in (0.0, 0.1, 1.0, 10.0):
                 least = np.min(kg + price * points / scale, axis=0)
                 assert (least <= at_kg + price * own / scale + 1e-9).all(), seed
+
+
+def test_virtual_controls_stand_after_all_others_of_their_step_and_mode():
+    rng = np.random.default_rng(6)
+    for _ in range(50):
+        steps, modes = rng.integers(1, 20), rng.integers(1, 5)
+        count = rng.integers(0, 4, (steps, modes))
+        ends = np.cumsum(count).reshape(steps, modes)
+        first = np.column_stack([ends[:, 0] - count[:, 0], ends])
+        block = rng.integers(0, steps * modes, rng.integers(0, 60))
+        entry, begin = among(first, block)
+        every = np.concatenate([np.repeat(np.arange(steps * modes), count.ravel()), block])
+        assert np.array_equal(entry, np.argsort(every, kind="stable"))
+        sizes = np.bincount(every, minlength=steps * modes).reshape(steps, modes)
+        assert np.array_equal(np.diff(begin, axis=1), sizes)
+        assert begin[0, 0] == 0 and np.array_equal(begin[1:, 0], begin[:-1, -1])
 
 
 def splits(count, *, between=""):

@@ -47,7 +47,7 @@ def test_slopes_that_are_two_per_cent_wrong_would_be_noticed(between):
 def worst_below(problem, cells, samples, weight, lower=0.0):
     """By how much a control between levels falls below its cell's points at most, as a share of the greatest."""
     cost = cells.fuel_kg + weight * cells.nox_kg
-    worst = virtual.Worst.of(problem.battery)
+    worst = virtual.worst_of(problem.battery)
     kg, watts, there = virtual.nodes_of(cost, cells.power_w, worst)
     kg = np.where(there, kg, np.inf)
     step_s, mine_kg = problem.table.step_s[cells.step], samples.fuel_kg + weight * samples.nox_kg
@@ -117,3 +117,13 @@ def test_cells_of_a_table_that_was_changed_are_not_those_of_the_car():
     table = build_problem(load_architecture("C2"), part("nedc", 110, 130)).table
     assert len(table.cells().step)
     assert replace(table, fuel_kg=1.01 * table.fuel_kg).cells() is None
+
+
+@pytest.mark.parametrize("name", ["C2", "p2_plug_in"])
+def test_without_a_weight_on_nox_cells_say_the_same_of_all_else(name):
+    problem = build_problem(load_architecture(name), part("nedc", 110, 150))
+    whole, without = problem.table.cells(), problem.table.cells(nox=False)
+    assert not without.nox_kg.any()
+    for what in ("step", "low", "high", "fuel_kg", "power_w", "apart"):
+        assert np.array_equal(getattr(whole, what), getattr(without, what))
+    assert (without.slack_kg <= whole.slack_kg).all()
