@@ -14,11 +14,15 @@ ratio, where the capacity is 0, nothing passes: a turbine that is faster than th
 
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hevopt.display.facts import Shown
+
+if TYPE_CHECKING:
+    from hevopt.car._converter_kernels import Pieces
 
 Array = NDArray[np.float64]
 # An efficiency of 1 by rounding is none above it.
@@ -41,6 +45,33 @@ class HydraulicConverter(Shown):
     lock_up_gear: int = 1
     in_gear_at_rest: bool = True
 
+    def least_lock_radps(self, idle_radps: float) -> float:
+        """Speed of the turbine from which it is locked in the gears that allow it: never below idle speed."""
+        return max(self.lock_up_radps, idle_radps)
+
+    def locks(
+        self, gear: NDArray[np.int64], turbine_radps: Array, idle_radps: float
+    ) -> NDArray[np.bool_]:
+        """(state,) whether it is locked in a gear at a speed of the turbine."""
+        fast: NDArray[np.bool_] = turbine_radps >= self.least_lock_radps(idle_radps)
+        return fast & (gear >= self.lock_up_gear)
+
+    @property
+    def pieces(self) -> "Pieces":
+        """The curves between their points, as compiled loops read them."""
+        from hevopt.car._converter_kernels import Pieces
+
+        ratio, capacity, multiple = (
+            np.ascontiguousarray(curve, dtype=np.float64)
+            for curve in (self.speed_ratio, self.capacity_nms2, self.torque_ratio)
+        )
+        rises = [np.diff(curve) / np.diff(ratio) for curve in (capacity, multiple)]
+        straight = [
+            np.column_stack([curve[:-1] - rise * ratio[:-1], rise])
+            for curve, rise in zip((capacity, multiple), rises, strict=True)
+        ]
+        return Pieces(ratio, multiple * capacity, *map(np.ascontiguousarray, straight))
+
     def torques_nm(self, impeller_radps: Array, turbine_radps: Array) -> tuple[Array, Array]:
         """(state,) torque that the impeller takes and that the turbine gives; impeller_radps above 0."""
         ratio = turbine_radps / impeller_radps
@@ -50,21 +81,12 @@ class HydraulicConverter(Shown):
 
     def impeller_radps(self, turbine_nm: Array, turbine_radps: Array) -> Array:
         """(state,) speed at which the turbine gives a torque; 0 where none is asked of it."""
-        ratio, capacity, multiple = self.speed_ratio, self.capacity_nms2, self.torque_ratio
-        speed, wanted = turbine_radps, np.maximum(turbine_nm, 0.0)
-        ends = speed[:, None] / ratio[1:]
-        more = multiple[1:] * capacity[1:] * ends**2 > wanted[:, None]
-        k = more.sum(axis=1)
-        b, d = (np.diff(curve)[k] / np.diff(ratio)[k] for curve in (capacity, multiple))
-        a, c = capacity[k] - b * ratio[k], multiple[k] - d * ratio[k]
-        squared, linear, constant = a * c, (a * d + b * c) * speed, b * d * speed**2 - wanted
-        root = np.sqrt(np.maximum(linear**2 - 4 * squared * constant, 0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            by_sum, by_difference = -2 * constant / (linear + root), (root - linear) / (2 * squared)
-            found = np.where(linear > 0, by_sum, by_difference)
-            highest = np.where(k > 0, speed / ratio[k], inf)
-        found = np.clip(found, ends[np.arange(len(k)), k], highest)
-        return np.where(wanted > 0, found, 0.0)
+        from hevopt.car._converter_kernels import all_impeller_radps
+
+        torque, speed = np.broadcast_arrays(
+            np.asarray(turbine_nm, dtype=np.float64), np.asarray(turbine_radps, dtype=np.float64)
+        )
+        return all_impeller_radps(self.pieces, torque.copy(), speed.copy())
 
 
 def flaw(speed_ratio: Array, torque_ratio: Array, torque_nm: Array) -> str | None:

@@ -18,6 +18,7 @@ from hevopt.forward._beside_kernels import (
     unit_radps,
 )
 from hevopt.forward._contact_kernels import Body, wheel_radps
+from hevopt.forward._fluid_kernels import closing_nm, poured
 from hevopt.forward._lever_kernels import (
     Lever,
     keeping_pace_nm,
@@ -62,7 +63,7 @@ class LoopTask(NamedTuple):
 
     time_s, speed_mps: (time + 1,); slope_rad: (time,); load_w: (2, time) electric load, engine at rest and not
     from_s, energy_j: (step + 1,); way, engine_on, apart, machine_nm: (step,); others_nm: (step, machine - 1)
-    energy_j: what the plan has stored; apart: the clutch is open while the car is braked, or no gear is in
+    energy_j: what the plan has stored; apart: `open_while` of a ForwardPlan
     machine_nm, others_nm: of the first machine of a Line, and of those beside it
     """
 
@@ -166,11 +167,18 @@ def inputs_of(
         target = limits.idle_radps
         if joint.launches:
             target = joint.launch_radps
+        elif joint.flows and joint.closing == 0.0:
+            target = split.target_radps
         elif joint.closing > 0.0 or joint.cause == motor.CHANGE:
             target = max(ratio * (wheel + pedal.accel_mps2 / car.body.radius_m * step_s), target)
             rate = 1.0 if joint.closing > 0.0 else rate
         governed = n + rate * (target - n)
         capacity = motor.capacity_nm(joint, split.clutch_nm, n - ratio * wheel, car.body.clutch)
+        if joint.flows and capacity > 0.0:
+            full = capacity
+            capacity = closing_nm(car.ways.fluid, split.clutch_nm, n, ratio * wheel, full)
+            if capacity < full:
+                governed = n + (1.0 - np.exp(-step_s / driver.governor_s)) * (target - n)
     else:
         low, high, engine = -np.inf, np.inf, 0.0
         if joint.phase == motor.STARTING:
@@ -182,7 +190,7 @@ def inputs_of(
     if pedal.holds:
         brake = -pedal.force_n * car.body.radius_m
     return Inputs(machine_nm, engine, governed, low, high, capacity, brake, slope_rad, way,
-                  lever.from_way, lever.blend)  # fmt: skip
+                  lever.from_way, lever.blend, joint.flows)  # fmt: skip
 
 
 @compiled(inline="always")
@@ -213,6 +221,19 @@ def _beside_set(
     low, high = first_range(car.beside, asked.low_nm, asked.high_nm, speed, others, car.limits)
     return AskedStep(asked.wheel_nm, asked.accel, min(max(asked.set_nm, low), high), low, high, asked.least_nm,
                      asked.most_nm, asked.braking, asked.lost_nm)  # fmt: skip
+
+
+@compiled()
+def _poured_of(
+    car: LoopCar, rows: Array, state: State, asked: AskedStep, lever: Lever, machine_nm: Array, step_s: float
+) -> Shared:  # fmt: skip
+    """Torques while a torque converter passes them."""
+    wheel = wheel_radps(state.speed_mps, state.spin_radps, car.body)
+    ratio = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, len(machine_nm) + 1)
+    turbine = max(ratio * (wheel + 0.5 * step_s * asked.accel), 0.0)
+    rate = 1.0 - np.exp(-step_s / car.driver.governor_s)
+    return poured(car.ways, rows, lever.way, state.variant, asked, car.limits, state.side_radps, turbine, rate,
+                  machine_nm)  # fmt: skip
 
 
 @compiled(inline="always")
@@ -253,11 +274,14 @@ def split_of(
         asked = _beside_set(
             car, rows[lever.way, state.variant], now, state, asked, joint, lever, load_w, machine_nm
         )
-    split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
-                   joint.launches, machine_nm)  # fmt: skip
+    if joint.flows and not closed:
+        split = _poured_of(car, rows, state, asked, lever, machine_nm, step_s)
+    else:
+        split = shared(rows, lever.way, state.variant, joints, asked, car.limits, closed,
+                       joint.launches, machine_nm)  # fmt: skip
     given = pace if cut else split.machine_nm
     if joint.phase != motor.TURNING and car.ways.side[lever.way, 1] != 0.0:
         given = 0.0
     brake = split.brake_nm + friction
     return Shared(split.engine_nm, given, split.clutch_nm, brake, split.full and not cut,
-                  split.wanted_nm)  # fmt: skip
+                  split.wanted_nm, split.target_radps)  # fmt: skip

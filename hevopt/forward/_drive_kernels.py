@@ -23,6 +23,7 @@ from hevopt.forward._acting_kernels import (
 )
 from hevopt.forward._beside_kernels import beside_w
 from hevopt.forward._contact_kernels import Pace, pace_of, wheel_radps
+from hevopt.forward._fluid_kernels import may_lock
 from hevopt.forward._lever_kernels import Lever, changed, resting_lever
 from hevopt.forward._limits_kernels import Gives, by_map, electric_w, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
@@ -40,10 +41,10 @@ ENGINE, MACHINE, CLUTCH, WHEEL, BRAKE, HELD, TYRE, ROAD = range(7, 15)
 # and its driver: force asked for, as numbers of _motor_kernels the engine's phase and why the clutch slips; whether
 # all is given and too little; and the directions in which power passed the joints
 ASKED, PHASE, CAUSE, FULL, VARIANT = range(15, 20)
-# Torque lost in a gearbox with a map, at its input; what the wheels turn beyond rolling, and the tyres' slip.
-# Behind them the torques of machines beyond the first.
-LOST, SPIN, SLIP = range(20, 23)
-COLUMNS = 23
+# Torque lost in a gearbox with a map, at its input; what the wheels turn beyond rolling, and the tyres' slip; what
+# a torque converter takes and gives beside its lock-up clutch. Behind them torques of machines beyond the first.
+LOST, SPIN, SLIP, IMPELLER, TURBINE = range(20, 25)
+COLUMNS = 25
 
 
 class Work(NamedTuple):
@@ -97,8 +98,11 @@ def begun(car: LoopCar, task: LoopTask, start_j: float) -> Loop:
     side = max(car.limits.idle_radps, turns) if on else 0.0
     state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0, 0.0, 0.0)
     lever, pedal = resting_lever(task.way[0]), PedalState(0.0, 0.0, 0.0, 0.0, True)
-    joint = motor.Joined(motor.TURNING if on else motor.REST, 1.0 if side == turns else 0.0, False, 0,
-                         car.limits.idle_radps)  # fmt: skip
+    fluid = car.ways.fluid
+    flows = on and len(fluid.locks) > 0
+    shut = side == turns and (not flows or may_lock(fluid, resting_lever(task.way[0]), turns))
+    joint = motor.Joined(motor.TURNING if on else motor.REST, 1.0 if shut else 0.0, False, 0,
+                         car.limits.idle_radps, flows)  # fmt: skip
     return Loop(state, pedal, lever, joint, start_j, task.speed_mps[0])
 
 
@@ -150,6 +154,7 @@ def record_step(
     row[ASKED], row[PHASE], row[CAUSE] = pedal.force_n, phase, cause
     row[FULL], row[VARIANT] = 1.0 if full else 0.0, state.variant
     row[LOST], row[SPIN], row[SLIP] = state.lost_nm, state.spin_radps, state.slip
+    row[IMPELLER], row[TURBINE] = out.impeller_nm, out.turbine_nm
     for m in range(1, len(machine_nm)):
         row[COLUMNS + m - 1] = machine_nm[m]
 
@@ -179,10 +184,17 @@ def after_step(
     phase = motor.phase_after(joint.phase, on, state.side_radps, car.limits.idle_radps)
     ratio = car.ways.wheel[lever.way, output]
     begins = lever.since_s == 0.0 and lever.blend > 0.0
-    neutral = task.apart[d] == 2 or (task.apart[d] == 1 and wish.braking) or pedal.holds
-    need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9) + state.lost_nm
-    joint = motor.joined(joint, phase, lever.gap_s > 0.0 or begins, neutral, wish.braking,
-                         ratio * wheel, need, car.limits, car.body.clutch, step_s)  # fmt: skip
+    fluid = car.ways.fluid
+    if len(fluid.locks) > 0:
+        neutral = task.apart[d] == 2 or (pedal.holds and not fluid.in_gear_at_rest)
+        locks = task.apart[d] != 3 and may_lock(fluid, lever, ratio * wheel)
+        joint = motor.locked_up(joint, phase, lever.gap_s > 0.0, neutral, locks, car.limits, car.body.clutch,
+                                step_s)  # fmt: skip
+    else:
+        neutral = task.apart[d] == 2 or (task.apart[d] == 1 and wish.braking) or pedal.holds
+        need = wish.wheel_nm / max(rows[lever.way, 0, col.CLUTCH], 1e-9) + state.lost_nm
+        joint = motor.joined(joint, phase, lever.gap_s > 0.0 or begins, neutral, wish.braking,
+                             ratio * wheel, need, car.limits, car.body.clutch, step_s)  # fmt: skip
     load_w = task.load_w[0 if phase == motor.REST else 1, k]
     for m in range(1, len(machine_nm)):
         machine_nm[m] = task.others_nm[d, m - 1]
@@ -199,7 +211,8 @@ def after_step(
         mean_w = 0.5 * (wheel + wheel_radps(state.speed_mps, state.spin_radps, car.body))
         power += beside_w(car.beside, car.ways, lever, mean_w, mean_n, machine_nm)
     energy = energy_after(car, energy, power + load_w, phase, out, mean_n, step_s)
-    stuck = phase == motor.TURNING and joint.closing == 0.0 and not joint.launches
+    passes = joint.closing > 0.0 or joint.launches or joint.flows
+    stuck = phase == motor.TURNING and not passes
     stuck = stuck or lever.gap_s > 0.0
     pedal = remembered(pedal, (stuck and not wish.braking) or (given.full and
                        pedal.error_mps > 0.0), car.body, car.driver, step_s)  # fmt: skip

@@ -160,7 +160,7 @@ def _inputs(
     elif pedal.force_n < 0.0:
         brake += friction_nm(car.loop, pedal.force_n * body.radius_m, state.speed_mps)
     return Inputs(machine_nm, given.engine_nm, governed, low, high, capacity, brake, slope_rad, state.way,
-                  state.way, 0.0)  # fmt: skip
+                  state.way, 0.0, False)  # fmt: skip
 
 
 @compiled()
@@ -188,7 +188,7 @@ def _stepped(
     most = limit_nm(car.motors, g, speeds[g])
     if wish.turns and not wish.joined:
         probe = Inputs(inputs.machine_nm, inputs.engine_nm, inputs.governed_radps, -np.inf, np.inf, 0.0,
-                       inputs.brake_nm, inputs.slope_rad, inputs.way, inputs.from_way, 0.0)  # fmt: skip
+                       inputs.brake_nm, inputs.slope_rad, inputs.way, inputs.from_way, 0.0, False)  # fmt: skip
         before, left = 0.0, 1.0
         for _ in range(_ROUNDS):
             after, out = step(body, ways, work.rows, state, probe, pace, work.moving)

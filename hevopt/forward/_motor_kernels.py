@@ -16,13 +16,17 @@ _CLOSED_SLIP_RADPS = 1.0
 
 
 class Joined(NamedTuple):
-    """The engine's phase and the clutch: closing from 0 to 1, whether it launches the car, why it slips."""
+    """The engine's phase and the clutch: closing from 0 to 1, whether it launches the car, why it slips.
+
+    flows: whether a torque converter passes torque, of which the clutch locks up
+    """
 
     phase: int
     closing: float
     launches: bool
     cause: int
     launch_radps: float
+    flows: bool = False
 
 
 @compiled()
@@ -57,22 +61,43 @@ def joined(
     """
     if phase != TURNING:
         cause = START if phase == STARTING else NONE
-        return Joined(phase, 0.0, False, cause, limits.idle_radps)
+        return Joined(phase, 0.0, False, cause, limits.idle_radps, False)
     if apart:
-        return Joined(phase, 0.0, False, CHANGE, limits.idle_radps)
+        return Joined(phase, 0.0, False, CHANGE, limits.idle_radps, False)
     if neutral or (braking and input_radps < _OPENS_AT * limits.idle_radps):
-        return Joined(phase, 0.0, False, before.cause, limits.idle_radps)
+        return Joined(phase, 0.0, False, before.cause, limits.idle_radps, False)
     launch = launch_radps(need_nm, limits) if need_nm > 0.0 else limits.idle_radps
     launch = max(launch, before.launch_radps) if before.launches else launch
     # It begins where the gears are slower than idle speed; above that the clutch closes, however much is asked for.
     begins_below = launch if before.launches else limits.idle_radps
     if not braking and input_radps < begins_below:
-        return Joined(phase, 0.0, True, LAUNCH, launch)
+        return Joined(phase, 0.0, True, LAUNCH, launch, False)
     if before.launches:
-        return Joined(phase, 1.0, False, LAUNCH, limits.idle_radps)
-    closing = 1.0 if clutch.closing_s <= 0 else min(before.closing + step_s / clutch.closing_s, 1.0)
+        return Joined(phase, 1.0, False, LAUNCH, limits.idle_radps, False)
     cause = before.cause if before.closing < 1.0 else NONE
-    return Joined(phase, closing, False, cause, limits.idle_radps)
+    return Joined(phase, _closing(before, clutch, step_s), False, cause, limits.idle_radps, False)
+
+
+@compiled()
+def locked_up(
+    before: Joined, phase: int, apart: bool, neutral: bool, locks: bool, limits: Limits, clutch: Clutch,
+    step_s: float,
+) -> Joined:  # fmt: skip
+    """The lock-up clutch of a step, and whether the torque converter beside it passes torque.
+
+    apart: a change of gear interrupts both; neutral: so does the cycle, or a car that is held
+    locks: speed and gear are those in which the clutch closes
+    """
+    if phase != TURNING or apart or neutral:
+        return Joined(phase, 0.0, False, NONE, limits.idle_radps, False)
+    if not locks:
+        return Joined(phase, 0.0, False, NONE, limits.idle_radps, True)
+    return Joined(phase, _closing(before, clutch, step_s), False, CHANGE, limits.idle_radps, True)
+
+
+@compiled()
+def _closing(before: Joined, clutch: Clutch, step_s: float) -> float:
+    return 1.0 if clutch.closing_s <= 0 else min(before.closing + step_s / clutch.closing_s, 1.0)
 
 
 @compiled()

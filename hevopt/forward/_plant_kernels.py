@@ -8,7 +8,8 @@ one step from wheels' speed w and engine side's speed n is
     T = Σ a q (torque - inertia) - brake,   Σ b p (torque - inertia) - T_clutch = 0
 
 linear in w', n' and the clutch's torque, which is what holds both sides together within ± its
-capacity (16): Coulomb friction, implicit, without events. The brake is Coulomb friction as well.
+capacity (16): Coulomb friction, implicit, without events. The brake is Coulomb friction as well. What a torque
+converter takes from n and gives towards w at the mean speeds of the step is made linear around a guess.
 Powers taken with the mean of the speeds before and after are exact differences of kinetic energy.
 """
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from hevopt._compile import compiled
 from hevopt.forward._contact_kernels import Body, Pace, grip_n, resistance
-from hevopt.forward._round_kernels import SETTLED, found_of, row_of
+from hevopt.forward._round_kernels import SETTLED, flow_of, flowing_nm, found_of, row_of
 from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State, Ways, turning
 from hevopt.forward._slip_kernels import slip_step
 from hevopt.forward._solve_kernels import Motion, SolvedStep, reached, solve, sums
@@ -46,6 +47,7 @@ def step(
     grip = grip_n(passive + along, inputs.slope_rad, body)
     top = max((motion.rest + per_n * of_torque * grip) / own, -wheel)
     governed = np.nan if inputs.governed_radps < 0.0 else inputs.governed_radps - state.side_radps
+    flows = inputs.flows and len(ways.fluid.pieces.speed_ratio) > 0
     ratio = turning(
         ways.wheel, inputs.way, inputs.from_way, inputs.blend, len(ways.inertia_kgm2) - 1
     )
@@ -60,7 +62,8 @@ def step(
         row = row_of(
             ways, rows, state, inputs, variant, moving, wheel, guess_wheel, guess_side, row
         )
-        s = sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s, lost)
+        flow = flow_of(ways, state, inputs, ratio, wheel, guess_wheel, guess_side)
+        s = sums(row, inputs.machine_nm, inputs.brake_nm, slip, per_s, lost, flow)
         solved = solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                         inputs.capacity_nm)  # fmt: skip
         if solved.wheel > top or solved.wheel < -wheel:
@@ -71,12 +74,13 @@ def step(
             solved = SolvedStep(rest.rest, *solved[1:])
             if free.wheel > top and reached(s, motion, solved) < motion.own * top:
                 solved = free
+        flowing = flowing_nm(flow, solved)
         found, guess_nm = found_of(
-            ways, row, state, inputs, variant, solved, ratio, wheel, per_s, lost
+            ways, row, state, inputs, variant, solved, ratio, wheel, per_s, lost, flowing[1]
         )
         still = abs(solved.wheel - guess_wheel) <= SETTLED * wheel
         still &= abs(solved.side - guess_side) <= SETTLED * state.side_radps
-        still |= not moving
+        still |= not (moving or flows)
         if found == variant and still and abs(guess_nm - lost) <= SETTLED * max(lost, 1.0):
             break
         variant, guess_wheel, guess_side = found, solved.wheel, solved.side
@@ -86,14 +90,14 @@ def step(
         - s.per_w * solved.wheel - s.per_n * solved.side
     )  # fmt: skip
     return _after(
-        body, state, inputs, pace, solved, variant, lost, drive, top, passive, rise, along
+        body, state, inputs, pace, solved, variant, lost, drive, top, passive, rise, along, flowing
     )
 
 
 @compiled()
 def _after(
     body: Body, state: State, inputs: Inputs, pace: Pace, solved: SolvedStep, variant: int, lost: float,
-    drive: float, top: float, passive: float, rise: float, along: float,
+    drive: float, top: float, passive: float, rise: float, along: float, flowing: tuple[float, float],
 ) -> tuple[State, Outputs]:  # fmt: skip
     """State and outputs; where the wheels' speed is a limit's, brakes or the road take what is over."""
     gained = solved.wheel * body.radius_m
@@ -131,8 +135,7 @@ def _after(
     side = state.side_radps + solved.side
     after = State(
         speed, force, side, inputs.way, inputs.from_way, inputs.blend, variant, lost, 0.0, 0.0
-    )  # fmt: skip
-    outputs = Outputs(
-        solved.engine_nm, solved.clutch_nm, torque, brake, held, mean, road + along, solved.locked
     )
+    outputs = Outputs(solved.engine_nm, solved.clutch_nm, torque, brake, held, mean, road + along, solved.locked,
+                      *flowing)  # fmt: skip
     return after, outputs

@@ -17,6 +17,7 @@ from hevopt.forward._contact_kernels import (
     resistance,
     wheel_radps,
 )
+from hevopt.forward._fluid_kernels import may_lock
 from hevopt.forward._lever_kernels import (
     Lever,
     changed,
@@ -92,15 +93,16 @@ def pull_begun(
 ) -> Pull:  # fmt: skip
     """The car before its first step; start: speed, place of the gear, stored energy."""
     speed, gear, energy = start
-    way, launches = by_gear[gear], speed == 0.0
+    way, flows = by_gear[gear], len(car.ways.fluid.locks) > 0
+    launches = speed == 0.0 and not flows
     ratio = car.ways.wheel[way, len(car.ways.inertia_kgm2) - 1]
     turns = max(ratio * speed / car.body.radius_m, car.limits.idle_radps)
     passive, _, along = resistance(speed, 0.0, car.body)
     state = State(speed, 0.0 if launches else passive + along, foot.launch_radps if launches else turns,
                   way, way, 0.0, 0, 0.0, 0.0, 0.0)  # fmt: skip
-    return Pull(
-        state, resting_lever(way), gear, launches, 0.0 if launches else 1.0, 0.0, 0.0, energy
-    )
+    lever = resting_lever(way)
+    closed = may_lock(car.ways.fluid, lever, turns) if flows else not launches
+    return Pull(state, lever, gear, launches, 1.0 if closed else 0.0, 0.0, 0.0, energy)
 
 
 @compiled()
@@ -147,7 +149,9 @@ def after_pull(
     state, lever, gear, launches, closing, gained, distance, energy = pull
     output, way = len(car.ways.inertia_kgm2) - 1, by_gear[0]
     wheel, n = wheel_radps(state.speed_mps, state.spin_radps, car.body), state.side_radps
-    if n >= foot.up_radps and gear + 1 < len(by_gear) and not launches and closing == 1.0:
+    flows = len(car.ways.fluid.locks) > 0
+    ready = lever.blend == 0.0 if flows else closing == 1.0 and not launches
+    if n >= foot.up_radps and gear + 1 < len(by_gear) and ready:
         gear, closing = gear + 1, 0.0
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     machine += car.ways.side[lever.way, 1] * n
@@ -175,13 +179,21 @@ def after_pull(
         capacity = launch_nm + on_side
         if car.body.tyre.slips:
             capacity = min(capacity, _held_nm(car, work.rows[way, 0], state.speed_mps))
+    elif flows:
+        # The lock-up clutch slows the engine as far as that is too fast, at full load.
+        locks = may_lock(car.ways.fluid, lever, ratio * wheel)
+        closing = (
+            min(closing + step_s / max(car.body.clutch.closing_s, step_s), 1.0) if locks else 0.0
+        )
+        target, rate = limits.engine_max_radps, 1.0
+        capacity = closing * clutch_capacity_nm(n - ratio * wheel, car.body.clutch)
     elif lever.gap_s == 0.0:
         closing = min(closing + step_s / max(car.body.clutch.closing_s, step_s), 1.0)
         rate = 1.0
         capacity = closing * clutch_capacity_nm(n - ratio * wheel, car.body.clutch)
     inputs = Inputs(machine_nm, gives.most_nm, n + rate * (target - n), gives.least_nm,
                     max(gives.most_nm, gives.least_nm), capacity, 0.0, 0.0, lever.way, lever.from_way,
-                    lever.blend)  # fmt: skip
+                    lever.blend, flows and lever.gap_s == 0.0)  # fmt: skip
     before = state.speed_mps
     state, out = step(car.body, car.ways, work.rows, state, inputs, pace, work.moving)
     distance += 0.5 * step_s * (before + state.speed_mps)

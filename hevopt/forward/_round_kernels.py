@@ -1,10 +1,12 @@
 """One round of guessing within a step: its row, and what its solution says of the guess. Compiled."""
 
 from hevopt._compile import compiled
-from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, lost_nm
-from hevopt.forward._solve_kernels import SolvedStep, directions, joint_torque_nm
+from hevopt.car._converter_kernels import passed
+from hevopt.forward._rows_kernels import Array, Inputs, State, Ways, fill_row, lost_nm, turning
+from hevopt.forward._solve_kernels import Flow, SolvedStep, directions, joint_torque_nm
 
-# Share of a speed within which a moving ratio is settled, and of a torque within which a map's loss is.
+# Share of a speed within which a moving ratio or a torque converter is settled, and of a torque within which what a
+# map says is lost is.
 SETTLED = 1e-13
 
 
@@ -23,19 +25,57 @@ def row_of(
 
 
 @compiled()
+def flow_of(
+    ways: Ways, state: State, inputs: Inputs, ratio: float, wheel: float, gained_wheel: float, gained_side: float
+) -> Flow:  # fmt: skip
+    """A torque converter's torques at the mean speeds of a step, around guessed changes of speed: a Newton step.
+
+    At those its loss is never negative, so that the step takes energy out, however long it is.
+    ratio: of the clutch's output, at the step's end
+    """
+    if not inputs.flows or len(ways.fluid.pieces.speed_ratio) == 0:
+        return Flow(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    output = len(ways.inertia_kgm2) - 1
+    before = turning(ways.wheel, state.way, state.from_way, state.blend, output) * wheel
+    turbine = 0.5 * (before + ratio * (wheel + gained_wheel))
+    found = passed(ways.fluid.pieces, state.side_radps + 0.5 * gained_side, turbine)
+    per_w, per_n = 0.5 * ratio, 0.5
+    taken = (
+        found.taken_nm
+        - found.taken_per_t * per_w * gained_wheel
+        - found.taken_per_p * per_n * gained_side
+    )
+    given = (
+        found.given_nm
+        - found.given_per_t * per_w * gained_wheel
+        - found.given_per_p * per_n * gained_side
+    )
+    return Flow(taken, found.taken_per_t * per_w, found.taken_per_p * per_n, given, found.given_per_t * per_w,
+                found.given_per_p * per_n)  # fmt: skip
+
+
+@compiled()
+def flowing_nm(flow: Flow, solved: SolvedStep) -> tuple[float, float]:
+    """What a torque converter takes and gives in a solution."""
+    taken = flow.taken_nm + flow.taken_per_w * solved.wheel + flow.taken_per_n * solved.side
+    given = flow.given_nm + flow.given_per_w * solved.wheel + flow.given_per_n * solved.side
+    return taken, given
+
+
+@compiled()
 def found_of(
     ways: Ways, row: Array, state: State, inputs: Inputs, variant: int, solved: SolvedStep, ratio: float,
-    wheel: float, per_s: float, lost: float,
+    wheel: float, per_s: float, lost: float, given: float,
 ) -> tuple[int, float]:  # fmt: skip
     """The variant of a round's solution, and what a gearbox with a map loses with it.
 
-    variant, lost: those that it was made with; ratio: of the clutch's output
+    variant, lost: those that it was made with; ratio: of the clutch's output; given: by a torque converter there
     """
     mean_wheel = wheel + 0.5 * solved.wheel
     mean_side = state.side_radps + 0.5 * solved.side
     found = directions(row, ways.load.shape[2], variant, inputs.machine_nm, solved, mean_wheel, mean_side,
-                       per_s, lost)  # fmt: skip
+                       per_s, lost - given)  # fmt: skip
     if ways.lost.loss_nm.size > 0:
-        through = joint_torque_nm(row, ways.lost.joint, inputs.machine_nm, solved, per_s, 0.0)
+        through = joint_torque_nm(row, ways.lost.joint, inputs.machine_nm, solved, per_s, -given)
         lost = lost_nm(ways.lost, inputs.way, ratio * mean_wheel, through)
     return found, lost

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hevopt._compile import compiled
+from hevopt.car._converter_kernels import NO_PIECES, Pieces
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,20 @@ class Lost(NamedTuple):
     loss_nm: Array
 
 
+class Fluid(NamedTuple):
+    """A torque converter in the clutch's place: its curves, and when its lock-up clutch is closed.
+
+    locks: (way,) whether it may be in a way; lock_radps: lowest speed of the turbine for it
+    in_gear_at_rest: whether the turbine is joined to the wheels of a car that is held
+    """
+
+    pieces: Pieces
+    locks: NDArray[np.bool_]
+    lock_radps: float
+    in_gear_at_rest: bool
+
+
+NO_FLUID = Fluid(NO_PIECES, np.zeros(0, np.bool_), np.inf, False)
 NO_LOSS = Lost(0, np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0, 0)))
 
 
@@ -53,7 +68,7 @@ class Ways(NamedTuple):
     sense: (way, joint, 2) speed that times this torque is the power that enters, per speed of wheels and side
     efficiency: (way, joint)
     inertia_kgm2: (unit,)
-    lost: of a gearbox with a map, whose joint itself loses nothing
+    lost: of a gearbox with a map, whose joint itself loses nothing; fluid: of a torque converter, or none
     """
 
     wheel: Array
@@ -65,6 +80,7 @@ class Ways(NamedTuple):
     efficiency: Array
     inertia_kgm2: Array
     lost: Lost = NO_LOSS
+    fluid: Fluid = NO_FLUID
 
 
 class State(NamedTuple):
@@ -91,7 +107,8 @@ class Inputs(NamedTuple):
 
     machine_nm: (machine,); engine_nm: asked for, given as it is where governed_radps < 0 or the clutch holds
     governed_radps: speed to which the engine keeps its side, with a torque from low_nm to high_nm
-    capacity_nm: of the clutch; brake_nm: of the brakes, at the wheels; slope_rad: of the road
+    capacity_nm: of the clutch; flows: whether a torque converter passes torque beside it
+    brake_nm: of the brakes, at the wheels; slope_rad: of the road
     """
 
     machine_nm: Array
@@ -105,10 +122,14 @@ class Inputs(NamedTuple):
     way: int
     from_way: int
     blend: float
+    flows: bool = False
 
 
 class Outputs(NamedTuple):
-    """Means over a step. held_nm: torque at the wheels that keeps a standing car from rolling back."""
+    """Means over a step. held_nm: torque at the wheels that keeps a standing car from rolling back.
+
+    impeller_nm, turbine_nm: what a torque converter takes and gives
+    """
 
     engine_nm: float
     clutch_nm: float
@@ -118,6 +139,8 @@ class Outputs(NamedTuple):
     force_n: float
     road_n: float
     locked: bool
+    impeller_nm: float
+    turbine_nm: float
 
 
 @compiled()
@@ -218,7 +241,7 @@ def settled_rows(ways: Ways) -> Array:
     rows = np.empty((count, variants, row_length(ways)))
     for way in range(count):
         state = State(0.0, 0.0, 0.0, way, way, 0.0, 0, 0.0, 0.0, 0.0)
-        inputs = Inputs(rows[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, way, way, 0.0)
+        inputs = Inputs(rows[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, way, way, 0.0, False)
         for variant in range(variants):
             fill_row(ways, state, inputs, variant, 0.0, 0.0, 0.0, rows[way, variant])
     return rows

@@ -24,6 +24,7 @@ class Shared(NamedTuple):
     """Torques for a step; clutch_nm: what the clutch has to pass; full: whether all is given and is too little.
 
     wanted_nm: of the engine, more than it can give included; 0 with the clutch open
+    target_radps: speed of the engine at which a torque converter's turbine gives what is asked for; else 0
     """
 
     engine_nm: float
@@ -32,6 +33,7 @@ class Shared(NamedTuple):
     brake_nm: float
     full: bool
     wanted_nm: float
+    target_radps: float
 
 
 class AskedStep(NamedTuple):
@@ -171,7 +173,7 @@ def shared(
     short = given < asked.wheel_nm - 1e-6 * abs(asked.wheel_nm) - 1e-9
     brake = max(given - asked.wheel_nm, 0.0) if asked.braking else 0.0
     full = short and not asked.braking and (closed or launching or meets.cm > 0.0)
-    return Shared(engine, machine, clutch, brake, full, wanted)
+    return Shared(engine, machine, clutch, brake, full, wanted, 0.0)
 
 
 @compiled(inline="always")

@@ -26,7 +26,7 @@ from hevopt.forward._contact_kernels import (
     resistance,
     wheel_radps,
 )
-from hevopt.forward._round_kernels import SETTLED, found_of, row_of
+from hevopt.forward._round_kernels import SETTLED, flow_of, flowing_nm, found_of, row_of
 from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State, Ways, turning
 from hevopt.forward._solve_kernels import Motion, solve, sums
 from hevopt.units import STANDARD_GRAVITY_MPS2
@@ -119,6 +119,7 @@ def slip_step(
     ground = ground_of(state, inputs, body)
     stiff = ground.free_kg / step_s + 0.5 * ground.rise
     governed = np.nan if inputs.governed_radps < 0.0 else inputs.governed_radps - state.side_radps
+    flows = inputs.flows and len(ways.fluid.pieces.speed_ratio) > 0
     ratio = turning(
         ways.wheel, inputs.way, inputs.from_way, inputs.blend, len(ways.inertia_kgm2) - 1
     )
@@ -139,18 +140,20 @@ def slip_step(
             -radius * (grip.force_n + grip.slope_n * at_none),
             ground.wheel_kgm2 * per_s + radius * grip.slope_n * grip.per_radps, 1.0,
         )  # fmt: skip
-        s = sums(row, inputs.machine_nm, 0.0, off, per_s, lost)
+        flow = flow_of(ways, state, inputs, ratio, wheel, guess_wheel, guess_side)
+        s = sums(row, inputs.machine_nm, 0.0, off, per_s, lost, flow)
         solved = solve(s, motion, governed, inputs.engine_nm, inputs.low_nm, inputs.high_nm,
                        inputs.capacity_nm)  # fmt: skip
+        flowing = flowing_nm(flow, solved)
         found, guess_nm = found_of(
-            ways, row, state, inputs, variant, solved, ratio, wheel, per_s, lost
+            ways, row, state, inputs, variant, solved, ratio, wheel, per_s, lost, flowing[1]
         )
         after = grip.bias + grip.per_radps * (wheel + solved.wheel)
         force = grip.force_n + grip.slope_n * (after - slip)
         free = state.speed_mps + (force - ground.against_n) / stiff
         still = abs(after - slip) <= _SETTLED_SLIP * (1.0 + abs(after)) and stands == (free <= 0.0)
         still = still and found == variant and abs(guess_nm - lost) <= SETTLED * max(lost, 1.0)
-        if moving:
+        if moving or flows:
             still = still and abs(solved.wheel - guess_wheel) <= SETTLED * abs(wheel)
             still = still and abs(solved.side - guess_side) <= SETTLED * state.side_radps
         if still or n == _ROUNDS - 1:
@@ -176,7 +179,7 @@ def slip_step(
     end = State(speed, force, state.side_radps + solved.side, inputs.way, inputs.from_way, inputs.blend, variant,
                 lost, spin, after)  # fmt: skip
     return end, Outputs(
-        solved.engine_nm, solved.clutch_nm, drive, brake, held, force, road, solved.locked
+        solved.engine_nm, solved.clutch_nm, drive, brake, held, force, road, solved.locked, *flowing
     )
 
 

@@ -35,6 +35,17 @@ class Sums(NamedTuple):
     side_known: float
 
 
+class Flow(NamedTuple):
+    """What a torque converter takes and gives in a step, linear in the changes of wheels' and side's speed."""
+
+    taken_nm: float
+    taken_per_w: float
+    taken_per_n: float
+    given_nm: float
+    given_per_w: float
+    given_per_n: float
+
+
 class Motion(NamedTuple):
     """The wheels' equation: own (w' - w) = rest + per_nm x torque."""
 
@@ -55,18 +66,21 @@ class SolvedStep(NamedTuple):
 
 @compiled()
 def sums(
-    row: Array, machine_nm: Array, brake_nm: float, slip: float, per_s: float, lost_nm: float
-) -> Sums:
+    row: Array, machine_nm: Array, brake_nm: float, slip: float, per_s: float, lost_nm: float, flow: Flow
+) -> Sums:  # fmt: skip
     """lost_nm: in a gearbox with a map, at the clutch's output."""
-    known = -row[col.MOVED] * per_s - brake_nm - row[col.CLUTCH] * lost_nm
-    side_known = -row[col.SIDE_MOVED] * per_s
+    clutch = row[col.CLUTCH]
+    known = -row[col.MOVED] * per_s - brake_nm - clutch * lost_nm + clutch * flow.given_nm
+    side_known = -row[col.SIDE_MOVED] * per_s - flow.taken_nm
     for m in range(len(machine_nm)):
         at = col.MACHINES + col.PER_MACHINE * m
         known += row[at] * machine_nm[m]
         side_known += row[at + 1] * machine_nm[m]
     return Sums(
-        row[col.RATIO], slip, row[col.ENGINE], row[col.CLUTCH], row[col.PER_W] * per_s, row[col.PER_N] * per_s,
-        known, row[col.SIDE_ENGINE], row[col.SIDE_PER_W] * per_s, row[col.SIDE_PER_N] * per_s, side_known,
+        row[col.RATIO], slip, row[col.ENGINE], clutch, row[col.PER_W] * per_s - clutch * flow.given_per_w,
+        row[col.PER_N] * per_s - clutch * flow.given_per_n, known, row[col.SIDE_ENGINE],
+        row[col.SIDE_PER_W] * per_s + flow.taken_per_w, row[col.SIDE_PER_N] * per_s + flow.taken_per_n,
+        side_known,
     )  # fmt: skip
 
 
@@ -162,7 +176,7 @@ def solve(
 def joint_torque_nm(
     row: Array, joint: int, machine_nm: Array, solved: SolvedStep, per_s: float, lost_nm: float
 ) -> float:
-    """Torque that enters a lossy joint, with what is lost at the clutch's output; nothing for what enters there."""
+    """Torque that enters a lossy joint; lost_nm: at the clutch's output, less what a converter gives there."""
     at = (
         col.MACHINES
         + col.PER_MACHINE * len(machine_nm)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.driveline import State
 from hevopt.car.handling import Handling
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError, InfeasibleError
@@ -21,7 +22,7 @@ from hevopt.forward._acting_kernels import LoopTask
 from hevopt.forward.breathing import EngineModel
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.loops import Driving, empty_course
-from hevopt.forward.plans import ForwardPlan, driver_gears, flows_of, signals_of
+from hevopt.forward.plans import ForwardPlan, driver_gears, flows_of, runs_free, signals_of
 from hevopt.forward.run import (
     STEP_S,
     ForwardRun,
@@ -62,7 +63,8 @@ class Asking(NamedTuple):
 class Decision(NamedTuple):
     """What a decision has the car do; gears: chosen beside the listed one, which it may choose as well, else 0.
 
-    machines_nm: torque of every machine; engine_radps, engine_nm: of the engine, read where its speed is free
+    machines_nm: torque of every machine
+    engine_radps, engine_nm: of the engine, read where its speed is free or a torque converter slips
     closed: whether a clutch of the strategy is
     """
 
@@ -98,7 +100,8 @@ class Decider:
         wanted = [f"{name}_torque_nm" for name in flows.machines]
         self._machines_nm = np.array([flows[name][:, columns] for name in wanted])
         self._engine = np.zeros((2, *self._machines_nm.shape[1:]))
-        if flows.car.driveline.free_engine_speed:
+        line = flows.car.driveline
+        if line.free_engine_speed or line.converter is not None:
             for n, name in enumerate(("engine_speed_radps", "engine_torque_nm")):
                 self._engine[n] = flows[name][:, columns]
         self._turning = turning_modes(problem)
@@ -174,6 +177,8 @@ def follow_asked(
         look = driving.seen(loop, at_s, decider.asking.interval_s, exact_s)
         command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
         task.way[d] = way(command.listed or int(gears[k]), command.gears)
+        if d > 0 and _coasts(car, command, look):
+            task.way[d], task.apart[d] = task.way[d - 1], 3
         task.engine_on[d] = command.engine_on
         torques = [command.machines_nm[machine] for machine in line.order]
         task.machine_nm[d], task.others_nm[d] = torques[0], torques[1:]
@@ -185,6 +190,14 @@ def follow_asked(
         loop = driving.advance(loop, int(begins[d]), record[begins[d] : begins[d + 1]], exact_s)
     planned_j = np.asarray(planned.energy_j, dtype=np.float64)
     return run_of(car, cycle, task, planned_j, line, handling, record, exact_s, driving)
+
+
+def _coasts(car: Architecture, command: Decision, look: col.Look) -> bool:
+    """Whether a gear is chosen only for the torque converter to be overrun in it: the gear that is in stays."""
+    state = State(command.engine_on, command.gears, frozenset(), command.listed)
+    return bool(
+        runs_free(car, [state], np.array([look.speed_mps]), np.array([command.engine_radps]))[0]
+    )
 
 
 def _undecided(

@@ -21,8 +21,10 @@ from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import step_flows
 
-# Share by which the loop keeps idle speed, and knows full load by its table.
+# Share by which the loop keeps idle speed.
 _EDGE = 1e-4
+# Share by which full load at a step's beginning may be above that of its mean speed.
+_AHEAD = 2e-3
 CAUSES = {motor.LAUNCH: "launch", motor.CHANGE: "change", motor.START: "start", motor.NONE: "other"}
 
 
@@ -141,6 +143,7 @@ def _driven(
     torque, given = record[:, col.ENGINE], machines_nm(record)
     turns = phase == motor.TURNING
     clutch = record[:, col.CLUTCH] * (n - units[-1])
+    fluid = record[:, col.IMPELLER] * n - record[:, col.TURBINE] * units[-1]
     cause = record[:, col.CAUSE].astype(int)
     speed = w * radius
     before = np.append(2 * speed[0] - record[0, col.SPEED], record[:-1, col.SPEED])
@@ -154,7 +157,7 @@ def _driven(
         "machine_power_w": np.sum(given * units[1:-1], axis=0),
         "machine_inertia_w": np.sum(inertia[1:-1], axis=0),
         "clutch_torque_nm": record[:, col.CLUTCH],
-        "clutch_loss_w": clutch,
+        "clutch_loss_w": clutch + fluid,
         "brake_power_w": record[:, col.BRAKE] * w,
         "held_w": record[:, col.HELD] * w,
         "wheel_power_w": record[:, col.WHEEL] * w,
@@ -168,6 +171,8 @@ def _driven(
         unit = line.order.index(place)
         flows[f"{machine}_torque_nm"] = given[unit]
         flows[f"{machine}_speed_radps"] = units[1 + unit]
+    if car.driveline.converter is not None:
+        flows["torque_converter_loss_w"] = fluid
     for number, name in CAUSES.items():
         flows[f"clutch_{name}_w"] = np.where(cause == number, clutch, 0.0)
     return flows
@@ -209,7 +214,8 @@ def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[
 
 def _applied(line: Line, record: Array, turning: Turning, step_s: float) -> Array:
     """(unit, step) torques on the units, less what their own inertia takes."""
-    applied = np.vstack([record[:, col.ENGINE], machines_nm(record), record[:, col.CLUTCH]])
+    passed = record[:, col.CLUTCH] + record[:, col.TURBINE]
+    applied = np.vstack([record[:, col.ENGINE], machines_nm(record), passed])
     inertia = line.ways.inertia_kgm2[:, None]
     less: Array = applied - inertia * np.diff(turning.units, axis=1) / step_s
     return less
@@ -251,7 +257,7 @@ def _burnt(
     idle = car.engine.idle_radps
     speed = np.where((speed < idle) & (speed > idle * (1 - _EDGE)), idle, speed)
     most = car.engine.covered_nm(np.where(turns, speed, idle))
-    torque = np.where((torque > most) & (torque < most * (1 + _EDGE)), most, torque)
+    torque = np.where((torque > most) & (torque < most * (1 + _AHEAD)), most, torque)
     fuel = np.where(turns, car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)), 0.0)
     by_map = {} if own_kgps is None else {"map_fuel_kgps": fuel}
     fuel = fuel if own_kgps is None else own_kgps

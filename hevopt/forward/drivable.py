@@ -4,31 +4,31 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import Driveline
-from hevopt.car.parts import Clutch, Gear, Gearbox, Part, Planetary
+from hevopt.car.parts import Clutch, Gear, Gearbox, Part, Planetary, TorqueConverter
 from hevopt.errors import DataError
 
 
 def check_drivable(car: Architecture) -> None:
     """DataError, saying what lacks, for a car whose driveline the plant does not know."""
     line, lacking = car.driveline, ""
-    odd = [part.name for part in line.parts if not isinstance(part, Gear | Gearbox | Clutch)]
+    known = Gear | Gearbox | Clutch | TorqueConverter
+    odd = [part.name for part in line.parts if not isinstance(part, known)]
     moved = [p.name for p in line.parts if isinstance(p, Clutch) and p.operation != "driver"]
-    if line.converter is not None:
-        lacking = f"{line.converter.name} slips, which the plant does not know"
-    elif line.free_engine_speed:
+    between: list[Clutch | TorqueConverter] = [*line.driver_clutches]
+    between += [] if line.converter is None else [line.converter]
+    if line.free_engine_speed:
         odd = [name for name in odd if not isinstance(_part(line, name), Planetary)]
         if odd or len(moved) > 1 or line.boxes:
             beside = ", ".join([*odd, *moved, *(box.name for box in line.boxes)])
             lacking = f"the strategy moves {beside} beside the engine's own speed"
         elif len(line.machines) < 2:
             lacking = "its engine has a speed of its own and no second machine"
-    elif line.engine is not None and not (line.boxes and line.driver_clutches):
-        lacking = "its engine is behind no driver's clutch and gears"
+    elif line.engine is not None and not (line.boxes and between):
+        lacking = "its engine is behind no driver's clutch, or torque converter, and gears"
     elif odd or moved:
         lacking = f"the strategy moves {', '.join([*odd, *moved])}"
     elif (mapped := mapped_boxes(line)) and (
-        len(line.boxes) > 1
-        or mapped[0].first not in {s for c in line.driver_clutches for s in c.shafts}
+        len(line.boxes) > 1 or mapped[0].first not in {s for c in between for s in c.shafts}
     ):
         lacking = "a loss_map is of more than one gearbox, or of one that is not behind the driver's clutch"
     own = any(box.choice == "free" for box in line.boxes)

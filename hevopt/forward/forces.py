@@ -17,6 +17,8 @@ from hevopt.problem.arrays import Array, Indices
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS, STANDARD_GRAVITY_MPS2
 
 LAUNCH_RPM = 1800.0
+# Speeds of the engine between which it meets a torque converter.
+_STALLS = 600
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -53,15 +55,12 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     for way in by_gear(line):
         ratio = ways.wheel[way, -1]
         side = np.maximum(ratio * wheel, launch if way == 0 else 0.0)
+        given = None
+        if car.driveline.converter is not None:
+            side, given = _stalled(car, driven, int(way), ratio * wheel, boosts)
+        machines = _floored(driven, int(way), wheel, side, boosts)
         full = tabulated(limits.full_nm, limits.engine_step, side)
-        machine_speed = ways.wheel[way, 1] * wheel + ways.side[way, 1] * side
-        machine = np.zeros_like(speed)
-        if len(limits.load_nm):
-            machine = tabulated(limits.load_nm[0], limits.engine_step, machine_speed)
-        elif boosts:
-            machine = tabulated(limits.high_nm, limits.machine_step, machine_speed)
-        machines = _floored(driven, way, wheel, side, machine, boosts)
-        on_side = full + ways.side[way, 1:-1] @ machines
+        on_side = full + ways.side[way, 1:-1] @ machines if given is None else given
         torque = ratio * ways.wheel_yield[way, 0, -1] * on_side
         torque += (ways.wheel[way, 1:-1] * ways.wheel_yield[way, 0, 1:-1]) @ machines
         if line.mapped:
@@ -78,18 +77,54 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     return Curves(speed, np.array(forces), resistance, float(grip))
 
 
-def _floored(
-    driven: LoopCar, way: int, wheel: Array, side: Array, first_nm: Array, boosts: bool
-) -> Array:
+def _floored(driven: LoopCar, way: int, wheel: Array, side: Array, boosts: bool) -> Array:
     """(machine, speed) torques at full pedal: the first machine's, and what the battery has left for the others."""
-    machines = np.zeros((len(driven.ways.inertia_kgm2) - 2, len(wheel)))
-    machines[0] = first_nm
+    ways, limits = driven.ways, driven.limits
+    machines = np.zeros((len(ways.inertia_kgm2) - 2, len(wheel)))
+    speed = ways.wheel[way, 1] * wheel + ways.side[way, 1] * side
+    if len(limits.load_nm):
+        machines[0] = tabulated(limits.load_nm[0], limits.engine_step, speed)
+    elif boosts:
+        machines[0] = tabulated(limits.high_nm, limits.machine_step, speed)
     for k in range(len(wheel) if len(machines) > 1 else 0):
         own = np.ascontiguousarray(machines[:, k])
-        floor_beside(driven.beside, driven.ways, resting_lever(int(way)), wheel[k], side[k], driven.limits, boosts,
-                     own)  # fmt: skip
+        floor_beside(
+            driven.beside, ways, resting_lever(way), wheel[k], side[k], limits, boosts, own
+        )
         machines[:, k] = own
     return machines
+
+
+def _stalled(
+    car: Architecture, driven: LoopCar, way: int, turbine: Array, boosts: bool
+) -> tuple[Array, Array]:
+    """Speed of the engine where it meets a torque converter at full pedal, and what this gives, at turbine speeds.
+
+    From idle speed on it is the first at which the impeller takes all there is; locked it is the turbine's.
+    """
+    part = car.driveline.converter
+    assert part is not None  # asked for where there is one
+    limits, fluid = driven.limits, driven.ways.fluid
+    side = np.linspace(limits.idle_radps, limits.engine_max_radps, _STALLS)
+    machines = _floored(driven, way, np.zeros(_STALLS), side, boosts)
+    most = (
+        tabulated(limits.full_nm, limits.engine_step, side) + driven.ways.side[way, 1:-1] @ machines
+    )
+    taken, _ = part.data.torques_nm(side, turbine[:, None])
+    over = taken - most
+    met = np.where((over >= 0).any(axis=1), np.argmax(over >= 0, axis=1), _STALLS - 1)
+    rows, below = np.arange(len(turbine)), np.maximum(met - 1, 0)
+    low, high = over[rows, below], over[rows, met]
+    share = np.where(
+        high > low, np.clip(-low / np.where(high > low, high - low, 1.0), 0.0, 1.0), 1.0
+    )
+    meets = side[below] + share * (side[met] - side[below])
+    locked = fluid.locks[way] & (turbine >= fluid.lock_radps)
+    engine = np.where(locked, turbine, meets)
+    _, given = part.data.torques_nm(meets, turbine)
+    full = tabulated(limits.full_nm, limits.engine_step, engine)
+    machines = _floored(driven, way, np.zeros(len(turbine)), engine, boosts)
+    return engine, np.where(locked, full + driven.ways.side[way, 1:-1] @ machines, given)
 
 
 def lost_at(car: Architecture, gear: int, speed_radps: Array, torque_nm: Array) -> Array:
@@ -129,9 +164,9 @@ def slope_at(car: Architecture, curves: Curves, speed_mps: float, handling: Hand
 def start_slope(car: Architecture, driven: LoopCar, handling: Handling, curves: Curves) -> float:
     """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip.
 
-    Without an engine what the machine gives at the slowest speed of the curves.
+    Without an engine, and with a torque converter, what the slowest speed of the curves has.
     """
-    if car.electric:
+    if car.electric or car.driveline.converter is not None:
         return slope_at(car, curves, float(curves.speed_mps[0]), handling)
     limits, ways = driven.limits, driven.ways
     launch = LAUNCH_RPM / RPM_PER_RADPS

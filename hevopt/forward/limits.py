@@ -35,8 +35,8 @@ def limits_of(
     least = np.nan_to_num(engine.drag_nm(speed))
     full = engine.covered_nm(speed)
     full = np.where(np.isnan(full) | (speed > engine.speed_max_radps), np.maximum(least, 0.0), full)
-    if car.driveline.free_engine_speed:
-        # Kept at idle speed by a machine it gives what it has there, a rounding below it too.
+    if car.driveline.free_engine_speed or car.driveline.converter is not None:
+        # Kept at idle speed by a machine, or loaded there by a converter, it gives what it has there, below it too.
         at_idle = float(engine.covered_nm(np.array([engine.idle_radps]))[0])
         full = np.where(speed < engine.idle_radps, at_idle, full)
     load, rows = np.zeros((0, len(speed))), _LOADS if most_w > least_w else 1

@@ -21,7 +21,7 @@ from hevopt.car.parts import WHEEL, Clutch, Joint
 from hevopt.car.ways import Way, way
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.forward._rows_kernels import NO_LOSS, Lost, Ways
+from hevopt.forward._rows_kernels import NO_FLUID, NO_LOSS, Fluid, Lost, Ways
 from hevopt.forward.drivable import check_drivable, limited_gears, mapped_boxes
 
 _NET = "net torque on "
@@ -92,7 +92,7 @@ def line_of(car: Architecture) -> Line:
         np.zeros((count, units)), np.zeros((count, units)),
         np.ones((count, variants, units)), np.ones((count, variants, units)),
         np.zeros((count, variants, len(lossy), units)), np.zeros((count, len(lossy), 2)),
-        np.ones((count, len(lossy))), np.array(inertia), _lost(line, lossy, keys),
+        np.ones((count, len(lossy))), np.array(inertia), _lost(line, lossy, keys), _fluid(car, keys),
     )  # fmt: skip
     for n, key in enumerate(keys):
         _fill(ways, n, _way(line, key), joints[key], tuple(lossy), (ENGINE, *machines), key[0])
@@ -182,6 +182,11 @@ def _way(line: Driveline, key: Key) -> Way:
             replace(p, operation="driver") if isinstance(p, Clutch) else p for p in line.parts
         )
         return way(replace(line, parts=parts), State(True), Phase(False, "slipping"))
+    if line.converter is not None:
+        # What a torque converter passes is found by the step; its lock-up clutch is one like a driver's.
+        part = line.converter
+        slips = Clutch(part.name, part.first, part.second, "driver")
+        line = replace(line, parts=tuple(slips if p is part else p for p in line.parts))
     if line.engine is None:
         return way(line, State(False, gears), Phase(False, "open", None, opened))
     box = next(box.name for box in line.boxes if gear in box.gears)
@@ -194,6 +199,17 @@ def _lossy(joints: object) -> dict[str, str]:
     for of_way in joints:  # type: ignore[attr-defined]
         found |= {j.name: j.loss for j in of_way if not j.lossless or j.lost is not None}
     return found
+
+
+def _fluid(car: Architecture, keys: list[Key]) -> Fluid:
+    """A car's torque converter."""
+    part = car.driveline.converter
+    if part is None:
+        return NO_FLUID
+    data = part.data
+    locks = np.array([gear >= data.lock_up_gear for gear, _, _ in keys])
+    least = float(data.least_lock_radps(car.engine.idle_radps))
+    return Fluid(data.pieces, locks, least, bool(data.in_gear_at_rest))
 
 
 def _lost(line: Driveline, lossy: dict[str, str], keys: list[Key]) -> Lost:

@@ -34,6 +34,8 @@ from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
 STEP_S = 0.01
 UP_RPM = 4200.0
+# Of an engine that does not turn that fast, the share of its highest speed [E].
+_UP_SHARE = 0.97
 SPEEDS_KMH = tuple(range(20, 161, 20))
 DISTANCES_M = (400.0, 1000.0)
 IN_GEAR_KMH = ((60, 100), (80, 120))
@@ -156,7 +158,8 @@ def performance(
 
 def _foot(car: Architecture, boosts: bool, fills: bool, boost_lag_s: float) -> Foot:
     """The pedal floored; a car without an engine launches and changes up at no speed of it, all by its machine."""
-    launch, up = (0.0, np.inf) if car.electric else (LAUNCH_RPM, UP_RPM)
+    up = min(UP_RPM, _UP_SHARE * RPM_PER_RADPS * car.engine.speed_max_radps)
+    launch, up = (0.0, np.inf) if car.electric else (LAUNCH_RPM, up)
     helps = boosts or fills or car.electric
     return Foot(
         launch / RPM_PER_RADPS, up / RPM_PER_RADPS, helps, fills, float(boost_lag_s), _NATURAL_SHARE

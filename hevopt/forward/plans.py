@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hevopt.car.architecture import Architecture
 from hevopt.car.driveline import State
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
@@ -22,7 +23,8 @@ class ForwardPlan(Shown):
     """A plan over the steps of a cycle, as the loop follows it.
 
     way: (time,) index of a Line; engine_on: (time,)
-    open_while: (time,) the clutch is open: 0 never, 1 while the car is braked, 2 always
+    open_while: (time,) the clutch is open: 0 never, 1 while the car is braked, 2 always; 3 a torque converter's
+    lock-up clutch alone is
     machine_nm: (time,) set-point of the Line's first machine while the engine drives
     others_nm: (time, machine - 1) of those beside it; energy_j: (time + 1,) stored energy
     course: of an engine that has a speed of its own, else None
@@ -43,7 +45,8 @@ def replay_of(trajectory: Trajectory, line: Line) -> ForwardPlan:
     flows, columns = flows_of(table)
     signals = signals_of(table)
     states = flows.states(columns[trajectory.control])
-    in_gear, open_while = driver_gears(signals, states)
+    free = runs_free(flows.car, states, signals.speed_mps, trajectory.flows["engine_speed_radps"])
+    in_gear, open_while = driver_gears(signals, states, free)
     way = [line.index(int(g), state.gears) for g, state in zip(in_gear, states, strict=True)]
     found, course = trajectory.flows, None
     torques = _own(np.stack([found[f"{name}_torque_nm"] for name in flows.machines], axis=1))
@@ -88,14 +91,42 @@ def signals_of(table: ControlTable) -> Signals:
     return table.signals
 
 
-def driver_gears(signals: Signals, states: Sequence[State] = ()) -> tuple[Indices, Indices]:
-    """(time,) gear that the driver has in, and `open_while` of the clutch; states: that chose gears."""
+def runs_free(
+    car: Architecture, states: Sequence[State], speed_mps: Array, engine_radps: Array
+) -> Flags:
+    """(time,) where a gear is chosen in which the turbine of a torque converter overruns its impeller.
+
+    Nothing passes there in any gear but the lock-up clutch closed: the car coasts, and a choice of gear is none.
+    """
+    chosen, part = (
+        np.array([state.listed for state in states], dtype=np.int64),
+        car.driveline.converter,
+    )
+    if part is None or car.gearbox is None:
+        return np.zeros(len(chosen), dtype=bool)
+    turbine = car.gearbox.ratios[chosen] * speed_mps / car.vehicle.tyre_radius_m
+    overruns = turbine >= part.data.speed_ratio[-1] * engine_radps
+    on = np.array([state.engine_on for state in states])
+    locked = part.data.locks(chosen, turbine, car.engine.idle_radps)
+    free: Flags = on & (chosen > 0) & (speed_mps > 0) & overruns & ~locked
+    return free
+
+
+def driver_gears(
+    signals: Signals, states: Sequence[State] = (), free: Flags | None = None
+) -> tuple[Indices, Indices]:
+    """(time,) gear that the driver has in, and `open_while` of the clutch.
+
+    states: that chose gears; free: of `runs_free`, where the gear that comes next is in
+    """
     listed = np.array([state.listed for state in states]) if states else np.zeros_like(signals.gear)
     gear = np.where(listed > 0, listed, signals.gear)
     moving = signals.speed_mps > 0
     neutral = (gear == 0) & moving
-    in_gear = _held(np.where(moving & (gear > 0), gear, 0))
+    free = np.zeros_like(moving) if free is None else free
+    in_gear = _held(np.where(moving & (gear > 0) & ~free, gear, 0))
     open_while = np.where(neutral, 2, np.where(signals.clutch_open, 1, 0)).astype(np.int64)
+    open_while[free] = 3
     return in_gear, open_while
 
 

@@ -25,6 +25,7 @@ SINKS = {
     "clutch_change_w": "clutch, changes",
     "clutch_start_w": "clutch, starts",
     "clutch_other_w": "clutch, else",
+    "torque_converter_loss_w": "torque converter",
     "gearbox_loss_w": "gearbox",
     "gear_loss_w": "gear pairs",
     "machine_loss_w": "machine",

@@ -118,13 +118,10 @@ def _phases(
 
 
 def _locks(car: Architecture, gear: Indices, input_radps: Array) -> Flags:
-    """(time,) where a torque converter is locked: never below idle speed."""
+    """(time,) where a torque converter is locked."""
     part = car.driveline.converter
     assert part is not None  # asked for where there is one
-    data = part.data
-    least = max(data.lock_up_radps, car.engine.idle_radps)
-    locks: Flags = (gear >= data.lock_up_gear) & (input_radps >= least)
-    return locks
+    return part.data.locks(gear, input_radps, car.engine.idle_radps)
 
 
 def _possible(car: Architecture, driver: Driver, state: State) -> Flags:

@@ -58,8 +58,9 @@ class Manoeuvre(Shown):
 
 def titled(manoeuvre: Manoeuvre) -> str:
     """A manoeuvre in a few words."""
-    kmh = manoeuvre.speed_mps * KMH_PER_MPS
-    return f"{manoeuvre.architecture.name}, full pedal at {kmh:g} km/h in gear {manoeuvre.gear}"
+    kmh, car = manoeuvre.speed_mps * KMH_PER_MPS, manoeuvre.architecture
+    locked = "" if car.driveline.converter is None else ", torque converter locked"
+    return f"{car.name}, full pedal at {kmh:g} km/h in gear {manoeuvre.gear}{locked}"
 
 
 def inertia_said(manoeuvre: Manoeuvre) -> str:

@@ -11,7 +11,7 @@ from hevopt.mean_value.parameters import Diesel
 from hevopt.tipin.bands import BASE, CASES, bands
 from hevopt.tipin.case import BASE as AS_SHIPPED
 from hevopt.tipin.case import Case, variation
-from hevopt.tipin.drive import Manoeuvre, TipIn, tip_in, tip_ins
+from hevopt.tipin.drive import Manoeuvre, TipIn, tip_in, tip_ins, titled
 from hevopt.tipin.figures import TIMES_S
 
 SMALL = "compact_1300"
@@ -218,3 +218,11 @@ def test_from_python_a_study_is_the_command_s(base):
     assert list(study.failed) == ["final drive 1.5"]
     with pytest.raises(DataError, match="gear 9 of a tip-in"):
         tip_in_study(gear=9)
+
+
+def test_a_torque_converter_is_said_to_be_taken_as_locked():
+    by_clutch = manoeuvre()
+    car = load_architecture(by_clutch.architecture.source, {"gearbox": "gearbox_automatic_4"})
+    by_converter = Manoeuvre(car, by_clutch.diesel, 40 / 3.6, 4)
+    assert titled(by_converter).endswith("in gear 4, torque converter locked")
+    assert titled(by_clutch).endswith("in gear 4")

@@ -16,7 +16,9 @@ POINTS_MAX = 2400
 TOLERANCE_KMH, TOLERANCE_S = 2.0, 1.0
 SLOPES = (0.0, 0.05, 0.10, 0.20, 0.30)
 _PULL_POINTS = 600
-_CAUSES = ("launch", "change", "start", "other")
+# What the clutch loses by cause, and a torque converter beside it.
+_LOSSES = {cause: f"clutch_{cause}_w" for cause in ("launch", "change", "start", "other")}
+_LOSSES["converter"] = "torque_converter_loss_w"
 
 
 def drawn_run(run: ForwardRun) -> dict[str, Any]:
@@ -45,7 +47,9 @@ def drawn_run(run: ForwardRun) -> dict[str, Any]:
             [name.replace("_", " "), mean(flows[f"{name}_torque_nm"])]
             for name, _ in run.car.driveline.machines
         ],
-        "clutch": {cause: mean(flows[f"clutch_{cause}_w"] / 1e3) for cause in _CAUSES},
+        "clutch": {
+            name: mean(flows[flow] / 1e3) for name, flow in _LOSSES.items() if flow in flows
+        },
         "brakes": mean(flows["brake_power_w"] / 1e3),
         "soc": _rounded(100 * run.soc[ends], 4),
         "plan": _rounded(100 * _soc_of(run, run.planned_j[ends]), 4),

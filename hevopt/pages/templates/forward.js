@@ -3,7 +3,7 @@
 
 (() => {
   const { axis, layout, figure, plain } = Page;
-  const CAUSES = { launch: 5, change: 1, start: 3, other: 0 };
+  const CAUSES = { launch: 5, change: 1, start: 3, other: 0, converter: 2 };
   let data;
 
   const line = (y, name, colour, more = {}) => ({ type: "scatter", mode: "lines", x: data.t, y, name, hovertemplate: `${name}: %{y:.4~g}<extra></extra>`, ...more, line: { color: colour, width: 1.4, ...more.line } });
@@ -20,7 +20,7 @@
       ["gear", 0.8, [line(data.gear, "gear", c[5], stepped)], { dtick: 1 }],
       ["engine<br>(1/min)", 1, [line(data.rpm, "engine", c[5])]],
       ["torque<br>(Nm)", 1.3, [line(data.engine, "engine", c[5]), ...data.machines.map(([name, torque], n) => line(torque, name, c[[3, 1, 2][n % 3]]))]],
-      ["clutch loss<br>(kW)", 1, Object.entries(CAUSES).map(([name, hue]) => line(data.clutch[name], name, c[hue]))],
+      ["clutch loss<br>(kW)", 1, Object.entries(CAUSES).filter(([name]) => data.clutch[name]).map(([name, hue]) => line(data.clutch[name], name, c[hue]))],
       ["brakes<br>(kW)", 0.8, [line(data.brakes, "friction brakes", c[1])]],
       ["SOC (%)", 1.3, [line(data.plan, "backward", look.muted, { line: { dash: "dash" } }), line(data.soc, "driven", c[3])]],
     ];
