@@ -39,15 +39,20 @@ _Loop = TypeVar("_Loop", bound=Callable[..., Any])
 
 
 def compiled(
-    *, inline: Literal["never", "always"] = "never", nogil: bool = False
+    *, inline: Literal["never", "always"] = "never", nogil: bool = False, bare: bool = False
 ) -> Callable[[_Loop], _Loop]:
     """Decorator: numba.njit, kept on disk; without that where neither package nor home can be written.
 
     nogil: others may run meanwhile, for loops that threads share
+    bare: reads and fills arrays, but makes none and gives none back. Nobody counts references to them then, which
+    for tuples of many arrays is most of the work, and it becomes part of whatever calls it but for a nogil one.
     """
+    options: dict[str, Any] = {"inline": inline, "nogil": nogil, "error_model": "numpy"}
+    if bare:
+        options |= {"_nrt": False, "forceinline": not nogil}
 
     def decorate(function: _Loop) -> _Loop:
-        loop: Any = numba.njit(inline=inline, nogil=nogil, error_model="numpy")(function)
+        loop: Any = numba.njit(**options)(function)
         if isinstance(loop, Dispatcher):
             loop._cache = _LateCache(function)  # type: ignore[attr-defined]
         return cast(_Loop, loop)

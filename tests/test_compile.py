@@ -5,11 +5,17 @@ import os
 import pickle
 import subprocess
 import sys
+from pathlib import Path
+from types import ModuleType
+from typing import get_type_hints
 
 import pytest
 from numba.core.caching import CacheImpl
+from numba.core.dispatcher import Dispatcher
 
+import hevopt
 from hevopt._compile import compiled
+from hevopt.forward._rows_kernels import Inputs, State
 
 TWICE = """
 from hevopt._compile import compiled
@@ -154,3 +160,41 @@ def test_a_kept_loop_is_loaded_without_the_parts_of_numba_that_only_compiling_ne
     assert said() == ["10.0 False 1", "nothing to add up"]
     # And compiling after loading, with other types and another loop, still works.
     assert said("more") == ["10.0 False 1", "nothing to add up", "2.0 10.0"]
+
+
+def bare_loops():
+    """Name -> every loop of the package that counts no references."""
+    folder, found = Path(hevopt.__file__).parent, {}
+    for path in folder.rglob("_*kernels.py"):
+        name = ".".join(path.relative_to(folder.parent).with_suffix("").parts)
+        for loop in vars(importlib.import_module(name)).values():
+            if isinstance(loop, Dispatcher) and loop.targetoptions.get("_nrt") is False:
+                found[f"{name}.{loop.__name__}"] = loop.py_func
+    return found
+
+
+def inlined(function):
+    loop = vars(importlib.import_module(function.__module__))[function.__name__]
+    return loop.targetoptions.get("inline") == "always"
+
+
+def has_arrays(kind):
+    if isinstance(kind, type) and hasattr(kind, "_fields"):
+        return any(has_arrays(of) for of in get_type_hints(kind).values())
+    return "ndarray" in str(kind)
+
+
+def test_a_loop_that_counts_no_references_gives_back_no_array():
+    """Whoever calls it would hand back one reference too many."""
+    loops = bare_loops()
+    assert len(loops) > 50
+    for name, function in loops.items():
+        known = [function.__globals__]
+        known += [vars(of) for of in function.__globals__.values() if isinstance(of, ModuleType)]
+        called = [names.get(word) for names in known for word in function.__code__.co_names]
+        own = [loop.py_func for loop in called if isinstance(loop, Dispatcher)]
+        for one in (function, *own):
+            # What is inlined as text counts as its caller does.
+            if one is function or not inlined(one):
+                assert not has_arrays(get_type_hints(one)["return"]), (name, one.__name__)
+    assert has_arrays(Inputs) and not has_arrays(State)

@@ -9,6 +9,7 @@ from hevopt._compile import compiled
 from hevopt.car.handling import DriverGains, Shifting
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
+from hevopt.forward._asks_kernels import NOBODY, Asks
 from hevopt.forward._beside_kernels import (
     Acts,
     Beside,
@@ -78,6 +79,7 @@ class LoopTask(NamedTuple):
     machine_nm: Array
     energy_j: Array
     others_nm: Array
+    asks: Asks = NOBODY
 
 
 class Now(NamedTuple):
@@ -203,7 +205,7 @@ def friction_nm(car: LoopCar, wheel_nm: float, speed_mps: float) -> float:
     return -wheel_nm * (1.0 - share_of_braking(speed_mps, rate, car.limits))
 
 
-@compiled()
+@compiled(bare=True)
 def _beside_set(
     car: LoopCar, row: Array, now: Now, state: State, asked: AskedStep, joint: motor.Joined, lever: Lever,
     load_w: float, machine_nm: Array,
@@ -223,7 +225,7 @@ def _beside_set(
                      asked.most_nm, asked.braking, asked.lost_nm)  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def _poured_of(
     car: LoopCar, rows: Array, state: State, asked: AskedStep, lever: Lever, machine_nm: Array, step_s: float
 ) -> Shared:  # fmt: skip

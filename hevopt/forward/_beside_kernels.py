@@ -50,14 +50,14 @@ class Acts(NamedTuple):
     discharges: bool
 
 
-@compiled()
+@compiled(bare=True)
 def unit_radps(ways: Ways, lever: Lever, unit: int, wheel: float, side: float) -> float:
     """Speed of a unit."""
     own = turning(ways.wheel, lever.way, lever.from_way, lever.blend, unit)
     return own * wheel + turning(ways.side, lever.way, lever.from_way, lever.blend, unit) * side
 
 
-@compiled()
+@compiled(bare=True)
 def beside_w(
     beside: Beside, ways: Ways, lever: Lever, wheel: float, side: float, machine_nm: Array
 ) -> float:
@@ -70,7 +70,7 @@ def beside_w(
     return total
 
 
-@compiled()
+@compiled(bare=True)
 def set_beside(beside: Beside, row: Array, ways: Ways, lever: Lever, wheel: float, side: float, acts: Acts,
                machine_nm: Array) -> None:  # fmt: skip
     """Set-points of the machines beside the first, in place, as far as they and the step go."""
@@ -92,7 +92,7 @@ def set_beside(beside: Beside, row: Array, ways: Ways, lever: Lever, wheel: floa
         left -= per * torque
 
 
-@compiled()
+@compiled(bare=True)
 def _within(
     torque: float, speed: float, rest_w: float, end_w: float, sign: float, limits: Limits
 ) -> float:
@@ -111,7 +111,7 @@ def _within(
     return low * torque
 
 
-@compiled()
+@compiled(bare=True)
 def first_range(
     beside: Beside, low: float, high: float, speed: float, rest_w: float, limits: Limits
 ) -> tuple[float, float]:  # fmt: skip
@@ -123,7 +123,7 @@ def first_range(
     return low, high
 
 
-@compiled()
+@compiled(bare=True)
 def floor_beside(
     beside: Beside, ways: Ways, lever: Lever, wheel: float, side: float, limits: Limits, helps: bool,
     machine_nm: Array,

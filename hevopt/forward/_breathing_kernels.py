@@ -95,6 +95,8 @@ def advance_breathing(
     place = drive.Place(start, 0, 0)
     for i in range(len(record)):
         place = drive.place_of(task, place, start + (first + i) * step_s)
+        if not drive.is_answered(car, task, loop, place.d, step_s):
+            break
         gives = gives_now(gas, loop.state.side_radps, car.limits, air.model)
         loop, wanted = drive.after_step(car, task, work, loop, place, gives, pace, record[i])
         burns = loop.joint.phase == motor.TURNING

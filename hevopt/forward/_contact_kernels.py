@@ -29,7 +29,7 @@ class Pace(NamedTuple):
     of_force: float
 
 
-@compiled()
+@compiled(bare=True)
 def clutch_capacity_nm(slip_radps: float, clutch: Clutch) -> float:
     """Highest torque of the closed clutch at a slip of either sign, equation (17)."""
     stuck = (clutch.slipping_nm - clutch.sticking_nm) * np.exp(
@@ -38,7 +38,7 @@ def clutch_capacity_nm(slip_radps: float, clutch: Clutch) -> float:
     return clutch.slipping_nm - stuck
 
 
-@compiled()
+@compiled(bare=True)
 def pace_of(step_s: float, lag_s: float) -> Pace:
     """Shares of a first-order lag under constant input: exact, whatever the step."""
     if lag_s <= 0.0:
@@ -47,7 +47,7 @@ def pace_of(step_s: float, lag_s: float) -> Pace:
     return Pace(step_s, decay, (1.0 - decay) * lag_s / step_s)
 
 
-@compiled()
+@compiled(bare=True)
 def pacejka_share(slip: float, tyre: Tyre) -> float:
     """Longitudinal force over load and friction at a slip, Pacejka's magic formula."""
     stretched = tyre.stiffness * slip
@@ -55,7 +55,7 @@ def pacejka_share(slip: float, tyre: Tyre) -> float:
     return np.sin(tyre.shape * np.arctan(bent))
 
 
-@compiled()
+@compiled(bare=True)
 def pacejka_slope(slip: float, tyre: Tyre) -> float:
     """Its derivative by slip."""
     stretched = tyre.stiffness * slip
@@ -70,7 +70,7 @@ def wheel_radps(speed_mps: float, spin_radps: float, body: Body) -> float:
     return speed_mps / body.radius_m + spin_radps
 
 
-@compiled()
+@compiled(bare=True)
 def resistance(speed: float, slope_rad: float, body: Body) -> tuple[float, float, float]:
     """Rolling and air resistance, its derivative by speed, and the weight's share along the road."""
     r, a, cos, sin = body.rolling_n, body.air_n, 1.0, 0.0
@@ -82,7 +82,7 @@ def resistance(speed: float, slope_rad: float, body: Body) -> tuple[float, float
     return passive, slope, body.mass_kg * STANDARD_GRAVITY_MPS2 * sin
 
 
-@compiled()
+@compiled(bare=True)
 def grip_n(against_n: float, slope_rad: float, body: Body) -> float:
     """Highest driving force (4) with the load that acceleration and slope move off the front axle."""
     tyre, weight = body.tyre, body.mass_kg * STANDARD_GRAVITY_MPS2

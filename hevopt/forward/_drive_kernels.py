@@ -4,7 +4,7 @@ Nothing but charge feeds back, so the loop keeps no books: it returns what acted
 (books.py) are made of that with the car's own components.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from hevopt.forward._acting_kernels import (
     is_called,
     split_of,
 )
+from hevopt.forward._asks_kernels import answered
 from hevopt.forward._beside_kernels import beside_w
 from hevopt.forward._contact_kernels import Pace, pace_of, wheel_radps
 from hevopt.forward._fluid_kernels import may_lock
@@ -48,11 +49,12 @@ COLUMNS = 25
 
 
 class Work(NamedTuple):
-    """What the loop works with: settled_rows of the ways, space for a row of a moving one, and for a torque."""
+    """What a loop works with: settled_rows of the ways, room for a row of a moving one, and (machine,) for more."""
 
     rows: Array
     moving: Array
     machine_nm: Array
+    machine_radps: Array
 
 
 class Loop(NamedTuple):
@@ -84,12 +86,12 @@ class Look(NamedTuple):
 @compiled()
 def work_of(ways: Ways) -> Work:
     """Room for the loop's work."""
-    return Work(
-        settled_rows(ways), np.empty(row_length(ways)), np.zeros(len(ways.inertia_kgm2) - 2)
-    )
+    machines = len(ways.inertia_kgm2) - 2
+    moving = np.empty(row_length(ways))
+    return Work(settled_rows(ways), moving, np.zeros(machines), np.zeros(machines))
 
 
-@compiled()
+@compiled(bare=True)
 def begun(car: LoopCar, task: LoopTask, start_j: float) -> Loop:
     """The loop before its first step."""
     output = len(car.ways.inertia_kgm2) - 1
@@ -106,7 +108,7 @@ def begun(car: LoopCar, task: LoopTask, start_j: float) -> Loop:
     return Loop(state, pedal, lever, joint, start_j, task.speed_mps[0])
 
 
-@compiled()
+@compiled(bare=True)
 def seen(
     car: LoopCar, task: LoopTask, loop: Loop, at_s: float, for_s: float, step_s: float
 ) -> Look:
@@ -121,7 +123,7 @@ def seen(
     return Look(max(middle, 0.0), pedal.force_n * car.body.radius_m)
 
 
-@compiled()
+@compiled(bare=True)
 def step_at(time_s: Array, at_s: float, k: int) -> int:
     """The step of some times, k or a later one, in which a time lies; the last one beyond the end."""
     while k < len(time_s) - 2 and at_s >= time_s[k + 1] - 1e-9:
@@ -129,7 +131,7 @@ def step_at(time_s: Array, at_s: float, k: int) -> int:
     return k
 
 
-@compiled()
+@compiled(bare=True)
 def energy_after(
     car: LoopCar, energy_j: float, power_w: float, phase: int, out: Outputs, mean_side: float, step_s: float
 ) -> float:  # fmt: skip
@@ -140,7 +142,7 @@ def energy_after(
     return float(energy_j - step_s * chemical_power_at(terminal, energy_j, car.battery))
 
 
-@compiled()
+@compiled(bare=True)
 def record_step(
     row: Array, state: State, pedal: PedalState, energy_j: float, phase: int, cause: int, full: bool,
     out: Outputs, machine_nm: Array,
@@ -226,7 +228,19 @@ def place_of(task: LoopTask, before: Place, at_s: float) -> Place:
     return Place(at_s, step_at(task.time_s, at_s, before.k), step_at(task.from_s, at_s, before.d))
 
 
-@compiled(nogil=True)
+@compiled(bare=True)
+def is_answered(car: LoopCar, task: LoopTask, loop: Any, d: int, step_s: float) -> bool:
+    """Whether the plan has a step d; whoever decides is asked for it as it begins. loop: a Loop, or a FreeLoop."""
+    asks = task.asks
+    if asks.address == 0 or d <= asks.last[0]:
+        return True
+    look = seen(car, task, loop, task.from_s[d], asks.for_s, step_s)
+    asks.told[0], asks.told[1], asks.told[2] = look.speed_mps, look.wheel_nm, loop.energy_j
+    asks.last[0] = d
+    return answered(asks.address, d) == 0
+
+
+@compiled(bare=True, nogil=True)
 def advance(
     car: LoopCar, task: LoopTask, work: Work, loop: Loop, first: int, record: Array, step_s: float
 ) -> Loop:  # fmt: skip
@@ -238,6 +252,8 @@ def advance(
     place = Place(start, 0, 0)
     for i in range(len(record)):
         place = place_of(task, place, start + (first + i) * step_s)
+        if not is_answered(car, task, loop, place.d, step_s):
+            break
         gives = by_map(loop.state.side_radps, car.limits)
         loop, _ = after_step(car, task, work, loop, place, gives, pace, record[i])
     return loop

@@ -20,13 +20,13 @@ _NEARLY_RADPS = 1.0
 _ROUNDING = 1e-9
 
 
-@compiled()
+@compiled(bare=True)
 def may_lock(fluid: Fluid, lever: Lever, turbine: float) -> bool:
     """Whether the lock-up clutch is closed in a gear at a speed of the turbine, a change into it included."""
     return bool(len(fluid.locks) > 0 and fluid.locks[lever.way] and turbine >= fluid.lock_radps)
 
 
-@compiled()
+@compiled(bare=True)
 def closing_nm(
     fluid: Fluid, need_nm: float, side: float, turbine: float, full_nm: float
 ) -> float:  # fmt: skip
@@ -37,7 +37,7 @@ def closing_nm(
     return min(max(need_nm - given, 0.0), full_nm)
 
 
-@compiled()
+@compiled(bare=True)
 def poured(
     ways: Ways, rows: Array, way: int, variant: int, asked: AskedStep, limits: Limits, side: float, turbine: float,
     rate: float, machine_nm: Array,

@@ -90,12 +90,12 @@ class Allotted(NamedTuple):
     full: bool
 
 
-@compiled()
+@compiled(bare=True)
 def _clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
-@compiled()
+@compiled(bare=True)
 def side_after(
     car: FreeCar, course: FreeCourse, now: Now, phase: int, wheel: float, step_s: float, more: float
 ) -> float:
@@ -121,14 +121,14 @@ def side_after(
     return max(n - idle / driver.stop_s * step_s, 0.0)
 
 
-@compiled()
+@compiled(bare=True)
 def may_not_rest(car: FreeCar, wheel: float) -> bool:
     """Whether the governor would turn too fast beside an engine at rest."""
     own = car.loop.ways.wheel[0, car.governor + 1] * wheel
     return bool(abs(own) > _NEARLY * car.motors.top_radps[car.governor])
 
 
-@compiled()
+@compiled(bare=True)
 def bus_w(car: FreeCar, machine_nm: Array, speeds: Array) -> float:
     """Electric power of all machines."""
     total = 0.0
@@ -137,7 +137,7 @@ def bus_w(car: FreeCar, machine_nm: Array, speeds: Array) -> float:
     return total
 
 
-@compiled()
+@compiled(bare=True)
 def _within(car: FreeCar, wish: FreeWish, speeds: Array, machine_nm: Array) -> None:
     """The driving machine's torque within its own limit and the battery's."""
     d, motors, limits = car.driving, car.motors, car.loop.limits
@@ -164,7 +164,7 @@ def _within(car: FreeCar, wish: FreeWish, speeds: Array, machine_nm: Array) -> N
         machine_nm[d] = low * wanted
 
 
-@compiled()
+@compiled(bare=True)
 def _others(row: Array, car: FreeCar, machine_nm: Array) -> tuple[float, float]:
     """What machines beside governor and driving one bring to wheels and side."""
     wheel, side = 0.0, 0.0
@@ -175,7 +175,7 @@ def _others(row: Array, car: FreeCar, machine_nm: Array) -> tuple[float, float]:
     return wheel, side
 
 
-@compiled()
+@compiled(bare=True)
 def _apart(
     row: Array, car: FreeCar, wish: FreeWish, speeds: Array, machine_nm: Array
 ) -> tuple[float, float]:
@@ -225,7 +225,7 @@ def _apart(
     return engine, side_accel
 
 
-@compiled()
+@compiled(bare=True)
 def _joined(
     row: Array, car: FreeCar, wish: FreeWish, speeds: Array, machine_nm: Array
 ) -> tuple[float, float, float]:
@@ -256,7 +256,7 @@ def _joined(
     return engine, side_accel, through
 
 
-@compiled()
+@compiled(bare=True)
 def allotted(
     car: FreeCar, rows: Array, way: int, variant: int, wish: FreeWish, wheel: float, side: float,
     speeds: Array, machine_nm: Array,

@@ -13,7 +13,14 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._acting_kernels import LoopTask, Now, friction_nm, is_called
 from hevopt.forward._contact_kernels import Pace, clutch_capacity_nm, pace_of
-from hevopt.forward._drive_kernels import Place, Work, energy_after, place_of, record_step
+from hevopt.forward._drive_kernels import (
+    Place,
+    Work,
+    energy_after,
+    is_answered,
+    place_of,
+    record_step,
+)
 from hevopt.forward._free_kernels import (
     Allotted,
     FreeCar,
@@ -49,7 +56,7 @@ class FreeLoop(NamedTuple):
     ahead_mps: float
 
 
-@compiled()
+@compiled(bare=True)
 def begun(car: FreeCar, task: LoopTask, course: FreeCourse, start_j: float) -> FreeLoop:
     """The loop before its first step."""
     on = task.engine_on[0]
@@ -60,7 +67,7 @@ def begun(car: FreeCar, task: LoopTask, course: FreeCourse, start_j: float) -> F
                     closing, start_j, task.speed_mps[0])  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def _planned_nm(car: FreeCar, task: LoopTask, course: FreeCourse, now: Now) -> float:
     """The engine's torque: the plan's, less what keeps the plan's stored energy."""
     d, time = now.step, task.from_s
@@ -74,14 +81,14 @@ def _planned_nm(car: FreeCar, task: LoopTask, course: FreeCourse, now: Now) -> f
     return float(max(lowered, car.fuelled_nm))
 
 
-@compiled()
+@compiled(bare=True)
 def _speeds(car: FreeCar, way: int, wheel: float, side: float, speeds: Array) -> None:
     ways = car.loop.ways
     for m in range(len(speeds)):
         speeds[m] = ways.wheel[way, m + 1] * wheel + ways.side[way, m + 1] * side
 
 
-@compiled()
+@compiled(bare=True)
 def _clutch_closing(
     car: FreeCar, loop: FreeLoop, wanted: bool, turns: bool, step_s: float
 ) -> float:
@@ -97,7 +104,7 @@ def _clutch_closing(
     return 1.0 if closing_s <= 0.0 else min(loop.closing + step_s / closing_s, 1.0)
 
 
-@compiled()
+@compiled(bare=True)
 def _wish(
     car: FreeCar, task: LoopTask, course: FreeCourse, row: Array, now: Now, loop: FreeLoop, pedal: PedalState,
     phase: int, closing: float, step_s: float,
@@ -138,7 +145,7 @@ def _wish(
                 pedal.holds, braking, least_w, car.motors.most_w, load_w)  # fmt: skip
 
 
-@compiled()
+@compiled(inline="always")
 def _inputs(
     car: FreeCar, loop: FreeLoop, pedal: PedalState, wish: FreeWish, given: Allotted, closing: float,
     slope_rad: float, machine_nm: Array, step_s: float,
@@ -163,7 +170,7 @@ def _inputs(
                   state.way, 0.0, False)  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def _stepped(
     car: FreeCar,
     work: Work,
@@ -202,14 +209,15 @@ def _stepped(
     return step(body, ways, work.rows, state, inputs, pace, work.moving)
 
 
-@compiled()
+@compiled(bare=True)
 def after_step(
-    car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, speeds: Array, loop: FreeLoop, place: Place,
-    pace: Pace, row: Array,
+    car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, loop: FreeLoop, place: Place, pace: Pace,
+    row: Array,
 ) -> FreeLoop:  # fmt: skip
-    """The loop after one step; speeds: room for those of the machines; row: filled."""
+    """The loop after one step; row: filled."""
     body, limits, driver, step_s = car.loop.body, car.loop.limits, car.loop.driver, pace.step_s
-    machine_nm, (state, pedal, phase, closing, energy, wanted) = work.machine_nm, loop
+    machine_nm, speeds = work.machine_nm, work.machine_radps
+    state, pedal, phase, closing, energy, wanted = loop
     at_s, k, d = place
     ahead = wanted_at(task.time_s, task.speed_mps, at_s + step_s + driver.preview_s, k)
     slope, wheel = task.slope_rad[k], state.speed_mps / body.radius_m
@@ -241,15 +249,17 @@ def after_step(
     return FreeLoop(state, pedal, phase, closing, energy, ahead)
 
 
-@compiled(nogil=True)
+@compiled(bare=True, nogil=True)
 def advance(
     car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, loop: FreeLoop, first: int, record: Array,
     step_s: float,
 ) -> FreeLoop:  # fmt: skip
     """The loop after some more steps, `first` of them being the first; record: (step, column), filled."""
     pace, start = pace_of(step_s, car.loop.body.tyre.lag_s), task.time_s[0]
-    place, speeds = Place(start, 0, 0), np.zeros(len(work.machine_nm))
+    place = Place(start, 0, 0)
     for i in range(len(record)):
         place = place_of(task, place, start + (first + i) * step_s)
-        loop = after_step(car, task, course, work, speeds, loop, place, pace, record[i])
+        if not is_answered(car.loop, task, loop, place.d, step_s):
+            break
+        loop = after_step(car, task, course, work, loop, place, pace, record[i])
     return loop

@@ -31,7 +31,7 @@ class Lever(NamedTuple):
     back: int
 
 
-@compiled()
+@compiled(bare=True)
 def resting_lever(way: int) -> Lever:
     """No change under way."""
     return Lever(way, way, 0.0, 0.0, _NEVER_S, -1)
@@ -44,7 +44,7 @@ def moves_machine(ways: Ways, lever: Lever) -> bool:
     return differs and (lever.blend > 0.0 or lever.gap_s > 0.0)
 
 
-@compiled()
+@compiled(bare=True)
 def changed(
     lever: Lever,
     asked: int,
@@ -83,7 +83,7 @@ def changed(
     return _followed(on, wheel_radps, ways, shifting, step_s, machine_nm)
 
 
-@compiled()
+@compiled(bare=True)
 def _followed(
     lever: Lever,
     wheel_radps: float,

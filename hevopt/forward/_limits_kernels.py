@@ -72,7 +72,7 @@ class Gives(NamedTuple):
     most_nm: float
 
 
-@compiled()
+@compiled(bare=True)
 def at(values: Array, step: float, x: float) -> float:
     """A curve's value: linear, beyond its ends the last."""
     place = min(max(x, 0.0) / step, len(values) - 1.000001)
@@ -80,7 +80,7 @@ def at(values: Array, step: float, x: float) -> float:
     return values[i] + (place - i) * (values[i + 1] - values[i])
 
 
-@compiled()
+@compiled(bare=True)
 def smooth_at(values: Array, step: float, x: float) -> float:
     """A smooth curve's value, by the cubic through four neighbours."""
     place = min(max(x, 0.0) / step, len(values) - 1.000001)
@@ -143,16 +143,31 @@ def electric_w(torque: float, speed: float, limits: Limits) -> float:
     return drawn_w(torque, speed, limits.loss_w, limits.machine_step, limits.torque_nm)
 
 
-@compiled()
+@compiled(bare=True)
 def limit_nm(motors: Motors, m: int, speed: float) -> float:
     """Highest torque of a machine at a speed, of either sign."""
     return at(motors.limit_nm[m], motors.step_radps[m], abs(speed))
 
 
-@compiled()
+@compiled(bare=True)
 def electric_of(motors: Motors, m: int, torque: float, speed: float) -> float:
     """Electric power of a machine, by its tabulated loss."""
     return drawn_w(torque, speed, motors.loss_w[m], motors.step_radps[m], motors.most_nm[m])
+
+
+@compiled(bare=True)
+def _between(points: Array, values: Array, x: float) -> float:
+    """As np.interp, of one value."""
+    last = len(points) - 1
+    if x >= points[last]:
+        return float(values[last])
+    if x <= points[0]:
+        return float(values[0])
+    i = 0
+    while x >= points[i + 1]:
+        i += 1
+    slope = (values[i + 1] - values[i]) / (points[i + 1] - points[i])
+    return float(slope * (x - points[i]) + values[i])
 
 
 @compiled(inline="always")
@@ -160,11 +175,11 @@ def terminal_w(bus_w: float, limits: Limits) -> float:
     """Power at the battery's terminals for one at the bus, as of `Converter.terminal_w`."""
     if len(limits.converter_w) == 0:
         return bus_w
-    share = float(np.interp(abs(bus_w), limits.converter_w, limits.converter_share))
+    share = _between(limits.converter_w, limits.converter_share, abs(bus_w))
     return bus_w / share if bus_w > 0.0 else bus_w * share
 
 
-@compiled()
+@compiled(bare=True)
 def launch_radps(need_nm: float, limits: Limits) -> float:
     """Engine speed of a launch: idle, or the lowest above it at which full load is a tenth more than needed."""
     speed = limits.idle_radps

@@ -29,7 +29,7 @@ class Joined(NamedTuple):
     flows: bool = False
 
 
-@compiled()
+@compiled(bare=True)
 def phase_after(phase: int, on: bool, side_radps: float, idle_radps: float) -> int:
     """The phase of a step, in which the engine is wanted turning or not."""
     if on:
@@ -41,7 +41,7 @@ def phase_after(phase: int, on: bool, side_radps: float, idle_radps: float) -> i
     return STOPPING
 
 
-@compiled()
+@compiled(bare=True)
 def joined(
     before: Joined,
     phase: int,
@@ -78,7 +78,7 @@ def joined(
     return Joined(phase, _closing(before, clutch, step_s), False, cause, limits.idle_radps, False)
 
 
-@compiled()
+@compiled(bare=True)
 def locked_up(
     before: Joined, phase: int, apart: bool, neutral: bool, locks: bool, limits: Limits, clutch: Clutch,
     step_s: float,
@@ -95,12 +95,12 @@ def locked_up(
     return Joined(phase, _closing(before, clutch, step_s), False, CHANGE, limits.idle_radps, True)
 
 
-@compiled()
+@compiled(bare=True)
 def _closing(before: Joined, clutch: Clutch, step_s: float) -> float:
     return 1.0 if clutch.closing_s <= 0 else min(before.closing + step_s / clutch.closing_s, 1.0)
 
 
-@compiled()
+@compiled(bare=True)
 def capacity_nm(joint: Joined, need_nm: float, slip_radps: float, clutch: Clutch) -> float:
     """The clutch's torque at most: all it has while it closes, what is asked for in a launch."""
     highest = clutch_capacity_nm(slip_radps, clutch)

@@ -22,7 +22,7 @@ _STANDSTILL_MPS = 0.02
 _HOLD_MPS2 = 3.0
 
 
-@compiled()
+@compiled(bare=True)
 def wanted_at(time_s: Array, speed_mps: Array, at_s: float, k: int) -> float:
     """The trace's speed at a time in its step k or a later one."""
     last = len(time_s) - 1
@@ -32,7 +32,7 @@ def wanted_at(time_s: Array, speed_mps: Array, at_s: float, k: int) -> float:
     return speed_mps[k] + share * (speed_mps[k + 1] - speed_mps[k])
 
 
-@compiled()
+@compiled(bare=True)
 def pressed(
     pedal: PedalState,
     now: float,
@@ -61,7 +61,7 @@ def pressed(
     )
 
 
-@compiled()
+@compiled(bare=True)
 def remembered(
     pedal: PedalState, frozen: bool, body: Body, driver: DriverGains, step_s: float
 ) -> PedalState:

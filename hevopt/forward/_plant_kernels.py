@@ -26,7 +26,7 @@ from hevopt.forward._solve_kernels import Motion, SolvedStep, reached, solve, su
 _ROUNDS = 12
 
 
-@compiled()
+@compiled(bare=True)
 def step(
     body: Body, ways: Ways, rows: Array, state: State, inputs: Inputs, pace: Pace, row: Array
 ) -> tuple[State, Outputs]:
@@ -94,7 +94,7 @@ def step(
     )
 
 
-@compiled()
+@compiled(bare=True)
 def _after(
     body: Body, state: State, inputs: Inputs, pace: Pace, solved: SolvedStep, variant: int, lost: float,
     drive: float, top: float, passive: float, rise: float, along: float, flowing: tuple[float, float],

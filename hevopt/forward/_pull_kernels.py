@@ -87,7 +87,7 @@ def pull_work(car: LoopCar) -> PullWork:
     return PullWork(settled_rows(car.ways), np.empty(row_length(car.ways)), np.zeros(machines))
 
 
-@compiled()
+@compiled(bare=True)
 def pull_begun(
     car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, start: tuple[float, int, float]
 ) -> Pull:  # fmt: skip
@@ -105,7 +105,7 @@ def pull_begun(
     return Pull(state, lever, gear, launches, 1.0 if closed else 0.0, 0.0, 0.0, energy)
 
 
-@compiled()
+@compiled(bare=True)
 def _lacking_nm(row: Array, missing_nm: float) -> float:
     """The machine's torque that does at the wheels what one of the engine would."""
     clutch = row[col.CLUTCH]
@@ -114,7 +114,7 @@ def _lacking_nm(row: Array, missing_nm: float) -> float:
     return float(engine * missing_nm / machine) if machine > 0.0 else 0.0
 
 
-@compiled()
+@compiled(bare=True)
 def _machine_nm(
     car: LoopCar, foot: Foot, pull: Pull, way_row: Array, speed: float, most_nm: float
 ) -> float:
@@ -131,7 +131,7 @@ def _machine_nm(
     return min(max(_lacking_nm(way_row, full - most_nm), 0.0), high)
 
 
-@compiled()
+@compiled(bare=True)
 def _held_nm(car: LoopCar, row: Array, speed_mps: float) -> float:
     """Torque of the clutch that a launch passes on tyres that slip: with more the wheels would spin up."""
     passive, _, along = resistance(speed_mps, 0.0, car.body)
@@ -213,13 +213,13 @@ def after_pull(
     return Pull(state, lever, gear, launches, closing, gained, distance, energy), out.engine_nm
 
 
-@compiled(nogil=True)
+@compiled(bare=True, nogil=True)
 def pull(
-    car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, start: tuple[float, int, float],
+    car: LoopCar, by_gear: NDArray[np.int64], foot: Foot, work: PullWork, start: tuple[float, int, float],
     step_s: float, record: Array,
 ) -> None:  # fmt: skip
     """Fill the record, (step, column); by_gear: way of every gear; start: as of pull_begun."""
-    pace, work, limits = pace_of(step_s, car.body.tyre.lag_s), pull_work(car), car.limits
+    pace, limits = pace_of(step_s, car.body.tyre.lag_s), car.limits
     moved = pull_begun(car, by_gear, foot, start)
     for i in range(len(record)):
         share = 1.0

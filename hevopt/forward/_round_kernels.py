@@ -10,7 +10,7 @@ from hevopt.forward._solve_kernels import Flow, SolvedStep, directions, joint_to
 SETTLED = 1e-13
 
 
-@compiled()
+@compiled(bare=True)
 def row_of(
     ways: Ways, rows: Array, state: State, inputs: Inputs, variant: int, moving: bool, wheel: float,
     gained_wheel: float, gained_side: float, room: Array,
@@ -24,7 +24,7 @@ def row_of(
     return room
 
 
-@compiled()
+@compiled(bare=True)
 def flow_of(
     ways: Ways, state: State, inputs: Inputs, ratio: float, wheel: float, gained_wheel: float, gained_side: float
 ) -> Flow:  # fmt: skip
@@ -54,7 +54,7 @@ def flow_of(
                 found.given_per_p * per_n)  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def flowing_nm(flow: Flow, solved: SolvedStep) -> tuple[float, float]:
     """What a torque converter takes and gives in a solution."""
     taken = flow.taken_nm + flow.taken_per_w * solved.wheel + flow.taken_per_n * solved.side
@@ -62,7 +62,7 @@ def flowing_nm(flow: Flow, solved: SolvedStep) -> tuple[float, float]:
     return taken, given
 
 
-@compiled()
+@compiled(bare=True)
 def found_of(
     ways: Ways, row: Array, state: State, inputs: Inputs, variant: int, solved: SolvedStep, ratio: float,
     wheel: float, per_s: float, lost: float, given: float,

@@ -143,14 +143,14 @@ class Outputs(NamedTuple):
     turbine_nm: float
 
 
-@compiled()
+@compiled(bare=True)
 def _place(axis: Array, at: float) -> tuple[int, float]:
     """Where a value lies on an axis, held at its ends."""
     i = min(max(int(np.searchsorted(axis, at, "right")) - 1, 0), len(axis) - 2)
     return i, min(max((at - axis[i]) / (axis[i + 1] - axis[i]), 0.0), 1.0)
 
 
-@compiled()
+@compiled(bare=True)
 def lost_nm(lost: Lost, way: int, speed_radps: float, torque_nm: float) -> float:
     """Torque lost at the input of a gearbox with a map; 0 without one."""
     if lost.loss_nm.size == 0:
@@ -164,21 +164,21 @@ def lost_nm(lost: Lost, way: int, speed_radps: float, torque_nm: float) -> float
     return float(low + y * (high - low))
 
 
-@compiled()
+@compiled(bare=True)
 def turning(rates: Array, way: int, from_way: int, blend: float, unit: int) -> float:
     """Speed of a unit per speed of the wheels, or of the engine's side, between one gear and another."""
     end = rates[way, unit]
     return end + blend * (rates[from_way, unit] - end) if blend > 0.0 else end
 
 
-@compiled()
+@compiled(bare=True)
 def _mean_rate(rate_before: float, rate_after: float, before: float, after: float) -> float:
     """What a unit's mean speed is to the mean speed that it turns with: so that no power is lost in between."""
     total = before + after
     return (rate_before * before + rate_after * after) / total if total > 0.0 else rate_after
 
 
-@compiled()
+@compiled(bare=True)
 def fill_row(
     ways: Ways, state: State, inputs: Inputs, variant: int, wheel: float, wheel_after: float,
     side_after: float, row: Array,
@@ -226,7 +226,7 @@ def fill_row(
                 row[at + JOINT_MACHINES + u - 1] = load
 
 
-@compiled()
+@compiled(bare=True)
 def row_length(ways: Ways) -> int:
     """Columns of a row."""
     machines = len(ways.inertia_kgm2) - 2

@@ -63,7 +63,7 @@ class Meets(NamedTuple):
     on_side: float
 
 
-@compiled()
+@compiled(bare=True)
 def _others(row: Array, machine_nm: Array) -> tuple[float, float]:
     """What machines beside the first bring to wheels and engine's side."""
     wheel, side = 0.0, 0.0
@@ -73,7 +73,7 @@ def _others(row: Array, machine_nm: Array) -> tuple[float, float]:
     return wheel, side
 
 
-@compiled()
+@compiled(bare=True)
 def meets_of(row: Array, accel: float, lost_nm: float, closed: bool, machine_nm: Array) -> Meets:
     """What reaches the wheels at an acceleration, with the torques of machines beside the first."""
     taken, (others, on_side) = row[col.CLUTCH] * lost_nm, _others(row, machine_nm)
@@ -89,12 +89,12 @@ def meets_of(row: Array, accel: float, lost_nm: float, closed: bool, machine_nm:
     )  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def _clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
-@compiled()
+@compiled(bare=True)
 def _closed(asked: AskedStep, meets: Meets, limits: Limits) -> tuple[float, float, float]:
     """Torques of engine and machine with the clutch closed, and the one wanted of the engine."""
     machine, need = asked.set_nm, asked.wheel_nm - meets.c0
@@ -116,7 +116,7 @@ def _closed(asked: AskedStep, meets: Meets, limits: Limits) -> tuple[float, floa
     return engine, machine, wanted
 
 
-@compiled()
+@compiled(bare=True)
 def _open(asked: AskedStep, meets: Meets, limits: Limits) -> float:
     """The machine's torque with the clutch open."""
     if meets.cm <= 0.0:
@@ -125,7 +125,7 @@ def _open(asked: AskedStep, meets: Meets, limits: Limits) -> float:
     return _clip((asked.wheel_nm - meets.c0) / meets.cm, low, asked.high_nm)
 
 
-@compiled()
+@compiled(bare=True)
 def shared(
     rows: Array, way: int, variant: int, joints: int, asked: AskedStep, limits: Limits, closed: bool,
     launching: bool, machine_nm: Array,
@@ -183,7 +183,7 @@ def machine_range(speed: float, limits: Limits) -> tuple[float, float]:
     return low, at(limits.high_nm, limits.machine_step, abs(speed))
 
 
-@compiled()
+@compiled(bare=True)
 def following_nm(side_radps: float, load_w: float, limits: Limits) -> float:
     """Torque of an alternator that follows the electric load."""
     rows = len(limits.load_nm)

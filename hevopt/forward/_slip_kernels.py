@@ -67,7 +67,7 @@ class Ground(NamedTuple):
     rise: float
 
 
-@compiled()
+@compiled(bare=True)
 def ground_of(state: State, inputs: Inputs, body: Body) -> Ground:
     """The contact of a step."""
     passive, rise, along = resistance(state.speed_mps, inputs.slope_rad, body)
@@ -81,7 +81,7 @@ def ground_of(state: State, inputs: Inputs, body: Body) -> Ground:
                   against, rise)  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def tyre_force_n(slip: float, ground: Ground, body: Body) -> tuple[float, float]:
     """The tyres' force at a slip, and how it rises with it; past its peak as if it rose from no slip."""
     tyre = body.tyre
@@ -93,7 +93,7 @@ def tyre_force_n(slip: float, ground: Ground, body: Body) -> tuple[float, float]
     return force, slope if slope > 0.0 or load == 0.0 else force / slip
 
 
-@compiled()
+@compiled(bare=True)
 def _linear(
     state: State, ground: Ground, body: Body, step_s: float, slip: float, speed: float, stands: bool
 ) -> Grip:
@@ -109,7 +109,7 @@ def _linear(
     return Grip(force, slope, bias / whole, step_s * radius / whole)
 
 
-@compiled()
+@compiled(bare=True)
 def slip_step(
     body: Body, ways: Ways, rows: Array, state: State, inputs: Inputs, pace: Pace, row: Array
 ) -> tuple[State, Outputs]:
@@ -183,7 +183,7 @@ def slip_step(
     )
 
 
-@compiled()
+@compiled(bare=True)
 def _held(
     state: State, inputs: Inputs, ground: Ground, body: Body, force: float, speed: float, step_s: float
 ) -> tuple[float, float, float]:  # fmt: skip

@@ -64,7 +64,7 @@ class SolvedStep(NamedTuple):
     locked: bool
 
 
-@compiled()
+@compiled(bare=True)
 def sums(
     row: Array, machine_nm: Array, brake_nm: float, slip: float, per_s: float, lost_nm: float, flow: Flow
 ) -> Sums:  # fmt: skip
@@ -84,7 +84,7 @@ def sums(
     )  # fmt: skip
 
 
-@compiled()
+@compiled(bare=True)
 def _free(s: Sums, motion: Motion, engine_nm: float, clutch_nm: float) -> SolvedStep:
     """Both changes for given torques."""
     own = motion.own + motion.per_nm * s.per_w
@@ -97,7 +97,7 @@ def _free(s: Sums, motion: Motion, engine_nm: float, clutch_nm: float) -> Solved
     )
 
 
-@compiled()
+@compiled(bare=True)
 def _locked(s: Sums, motion: Motion, engine_nm: float) -> SolvedStep:
     """Both changes and the clutch's torque where no slip is left after the step."""
     inner = s.side_per_w + s.side_per_n * s.ratio
@@ -110,7 +110,7 @@ def _locked(s: Sums, motion: Motion, engine_nm: float) -> SolvedStep:
     return SolvedStep(wheel, s.ratio * wheel - s.slip, engine_nm, through - inner * wheel, True)
 
 
-@compiled()
+@compiled(bare=True)
 def _governed(s: Sums, motion: Motion, side: float, clutch_nm: float) -> SolvedStep:
     """The wheels' change and the engine's torque for a given change of its side."""
     over = s.engine / s.side_engine
@@ -123,7 +123,7 @@ def _governed(s: Sums, motion: Motion, side: float, clutch_nm: float) -> SolvedS
     return SolvedStep(wheel, side, (s.side_per_w * wheel + given) / s.side_engine, clutch_nm, False)
 
 
-@compiled()
+@compiled(bare=True)
 def reached(s: Sums, motion: Motion, solved: SolvedStep) -> float:
     """The right-hand side of the wheels' equation with the torques of a solution.
 
@@ -135,7 +135,7 @@ def reached(s: Sums, motion: Motion, solved: SolvedStep) -> float:
     return motion.rest + motion.per_nm * torque
 
 
-@compiled()
+@compiled(bare=True)
 def solve(
     s: Sums,
     motion: Motion,
@@ -172,7 +172,7 @@ def solve(
     return _free(s, motion, min(max(solved.engine_nm, low_nm), high_nm), clutch_nm)
 
 
-@compiled()
+@compiled(bare=True)
 def joint_torque_nm(
     row: Array, joint: int, machine_nm: Array, solved: SolvedStep, per_s: float, lost_nm: float
 ) -> float:
@@ -195,7 +195,7 @@ def joint_torque_nm(
     return torque
 
 
-@compiled()
+@compiled(bare=True)
 def directions(
     row: Array,
     joints: int,

@@ -7,6 +7,7 @@ or off, gears beside the listed one, and while the engine drives the machine's t
 rest. Gears and clutch are the driver's, as in a replayed plan.
 """
 
+import ctypes
 from functools import cache
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward._acting_kernels import LoopTask
+from hevopt.forward._asks_kernels import Asked, Asks
 from hevopt.forward.breathing import EngineModel
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.loops import Driving, empty_course
@@ -165,31 +167,64 @@ def follow_asked(
     from_s = cycle.time_s[0] + exact_s * begins
     # Nothing is planned, so that there is no charge to be kept.
     driver = handling.driver._replace(charge_per_s=0.0)
-    gears, step, task = _undecided(car, cycle, from_s, planned)
+    orders = _Orders(car, cycle, decider, planned, line, from_s)
+    task, course = orders.task, orders.course
     driven = loop_car(car, line, handling._replace(driver=driver), task.load_w)
-    course = empty_course(line, len(from_s) - 1, len(car.machines))
     driving = Driving(car, line, cycle, driven, task, course, engine_model)
     loop = driving.begun(float(planned.energy_j[0]))
-    way = cache(line.index)
-    for d, at_s in enumerate(from_s[:-1].tolist()):
+    orders.decide(0, driving.seen(loop, from_s[0], task.asks.for_s, exact_s), loop.energy_j)
+    driving.advance(driving.begun(loop.energy_j), 0, record, exact_s)
+    if orders.fault is not None:
+        raise orders.fault
+    planned_j = np.asarray(planned.energy_j, dtype=np.float64)
+    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s, driving)
+
+
+class _Orders:
+    """The task of a loop, filled decision by decision: asked by the loop itself, which hands over no car.
+
+    fault: what went wrong in a decision, upon which the loop has ended
+    """
+
+    def __init__(
+        self, car: Architecture, cycle: Cycle, decider: Decider, planned: Trajectory, line: Line, from_s: Array
+    ) -> None:  # fmt: skip
+        self.fault: BaseException | None = None
+        self._car = car
+        self._decider, self._way, self._order = decider, cache(line.index), line.order
+        self._gears, self._step, task = _undecided(car, cycle, from_s, planned)
+        self._asked = Asked(self._answer)  # kept, as the loop knows nothing but where it is
+        address = ctypes.cast(self._asked, ctypes.c_void_p).value
+        assert address is not None  # of a function that is there
+        self._told, first = np.zeros(3), np.zeros(1, dtype=np.int64)
+        self.task = task._replace(asks=Asks(address, decider.asking.interval_s, first, self._told))
+        self.course = empty_course(line, len(from_s) - 1, len(car.machines))
+
+    def decide(self, d: int, look: col.Look, energy_j: float) -> None:
+        """The task's step d filled with what is decided."""
+        decider, task, course = self._decider, self.task, self.course
         # A step of the driven car may begin a little before the cycle's.
-        k = int(step[d]) if decider.points is not None else min(d, len(gears) - 1)
-        look = driving.seen(loop, at_s, decider.asking.interval_s, exact_s)
-        command = decider.decide(at_s, k, int(gears[k]), look, loop.energy_j)
-        task.way[d] = way(command.listed or int(gears[k]), command.gears)
-        if d > 0 and _coasts(car, command, look):
+        k = int(self._step[d]) if decider.points is not None else min(d, len(self._gears) - 1)
+        gear = int(self._gears[k])
+        command = decider.decide(float(task.from_s[d]), k, gear, look, energy_j)
+        task.way[d] = self._way(command.listed or gear, command.gears)
+        if d > 0 and _coasts(self._car, command, look):
             task.way[d], task.apart[d] = task.way[d - 1], 3
         task.engine_on[d] = command.engine_on
-        torques = [command.machines_nm[machine] for machine in line.order]
+        torques = [command.machines_nm[machine] for machine in self._order]
         task.machine_nm[d], task.others_nm[d] = torques[0], torques[1:]
         if course is not None:
             course.engine_radps[d], course.engine_nm[d] = command.engine_radps, command.engine_nm
             course.machine_nm[d], course.closed[d] = command.machines_nm, command.closed
-        if d == 0:
-            loop = driving.begun(loop.energy_j)
-        loop = driving.advance(loop, int(begins[d]), record[begins[d] : begins[d + 1]], exact_s)
-    planned_j = np.asarray(planned.energy_j, dtype=np.float64)
-    return run_of(car, cycle, task, planned_j, line, handling, record, exact_s, driving)
+
+    def _answer(self, d: int) -> int:
+        speed_mps, wheel_nm, energy_j = self._told.tolist()
+        try:
+            self.decide(d, col.Look(speed_mps, wheel_nm), energy_j)
+        except BaseException as fault:  # nothing passes a compiled loop
+            self.fault = fault
+            return 1
+        return 0
 
 
 def _coasts(car: Architecture, command: Decision, look: col.Look) -> bool:

@@ -18,7 +18,7 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.lines import Line
 from hevopt.forward.slipping import slipping
 from hevopt.problem._battery_kernels import trace
-from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.battery import step_flows
 
 # Share by which the loop keeps idle speed.
@@ -75,12 +75,19 @@ def turning_of(
     if before is not None:
         at_start = before[None, [col.WAY, col.FROM_WAY, col.BLEND]]
     moved = np.vstack([at_start, record[:, [col.WAY, col.FROM_WAY, col.BLEND]]])
-    way, from_way, blend = moved[:, 0].astype(int), moved[:, 1].astype(int), moved[:, 2:]
-    by_wheel, by_side = (
-        (rate[way] + blend * (rate[from_way] - rate[way])).T
-        for rate in (line.ways.wheel, line.ways.side)
-    )
+    way, from_way, blend = moved[:, 0].astype(int), moved[:, 1].astype(int), moved[:, 2]
+    rates = line.ways.wheel, line.ways.side
+    by_wheel, by_side = (_rates(rate, way, from_way, blend) for rate in rates)
     return Turning(wheel, side, by_wheel * wheel + by_side * side, by_wheel * wheel, spin)
+
+
+def _rates(rate: Array, way: Indices, from_way: Indices, blend: Array) -> Array:
+    """(unit, step) what units turn per speed of the wheels, or of the engine's side."""
+    found: Array = np.ascontiguousarray(rate.T)[:, way]
+    moves = np.flatnonzero(blend)
+    end, begin = rate[way[moves]], rate[from_way[moves]]
+    found[:, moves] = (end + blend[moves, None] * (begin - end)).T
+    return found
 
 
 def books_of(
@@ -196,15 +203,16 @@ def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[
     applied[-1] -= record[:, col.LOST]
     power = applied * turning.mean(turning.by_wheel)
     wheel, side = turning.mean(turning.wheel), turning.mean(turning.side)
-    settled = ways.wheel[way]
+    settled = ways.wheel
     per_wheel = np.divide(1.0, settled, out=np.zeros_like(settled), where=settled != 0)
     result = {"gearbox_loss_w": np.zeros(len(way)), "gear_loss_w": np.zeros(len(way))}
     for j, name in enumerate(line.losses):
-        load, sense, eta = ways.load[way, variant, j], ways.sense[way, j], ways.efficiency[way, j]
+        sense, eta = ways.sense[way, j], ways.efficiency[way, j]
         if line.free is None:
-            entering = np.einsum("nu,un->n", load * sense[:, :1] * per_wheel, power)
+            share = ways.load[:, :, j] * ways.sense[:, None, j, :1] * per_wheel[:, None]
+            entering = np.einsum("nu,un->n", share[way, variant], power)
         else:
-            through = np.einsum("nu,un->n", load, applied)
+            through = np.einsum("nu,un->n", ways.load[way, variant, j], applied)
             entering = through * (sense[:, 0] * wheel + sense[:, 1] * side)
         backward = (variant >> j & 1).astype(bool)
         result[f"{name}_loss_w"] += entering * np.where(backward, 1 - 1 / eta, 1 - eta)

@@ -192,10 +192,11 @@ def _pulled(
     driven, ways, foot = floored.driven, floored.ways, floored.foot
     start = speed_mps, place, floored.start_j
     record: Array = np.zeros((round(_LONGEST_S / STEP_S), col.COLUMNS))
+    work = col.pull_work(driven)
     if floored.engine_model == "map":
-        col.pull(driven, ways, foot, start, STEP_S, record)
+        col.pull(driven, ways, foot, work, start, STEP_S, record)
         return record
-    moved, work = col.pull_begun(driven, ways, foot, start), col.pull_work(driven)
+    moved = col.pull_begun(driven, ways, foot, start)
     breathing = Breathing(
         floored.car, moved.state.side_radps, _torque_before(floored, speed_mps, place)
     )

@@ -47,23 +47,26 @@ _BOUND_NOTE = (
 
 
 def twin_table(driven: DrivenPlan) -> Table:
-    """The run, its backward twin and the bound of that."""
+    """The run, its backward twin and the bound of that; a car without an engine burns nothing, and has no bound."""
     run, back = driven.run, driven.backward
+    fuel = {
+        "fuel\nl/100 km": (f"{driven.fuel_l_per_100km:.4f}", number(back.fuel_l_per_100km, 4)),
+        "corrected\nl/100 km": (
+            number(driven.corrected_l_per_100km, 4), number(back.fuel_corrected_l_per_100km, 4),
+        ),
+    }  # fmt: skip
+    battery = f"{driven.electricity_kwh_per_100km:.3f}", number(back.electricity_kwh_per_100km, 3)
+    nox = {"NOx\nmg/km": (number(driven.nox_mg_per_km, 1), number(back.nox_mg_per_km, 1))}
+    soc = {"SOC\nend": (f"{run.soc[-1]:.4f}", number(back.soc_end, 4))}
+    starts = {"starts\n": (f"{run.starts}", f"{back.engine_starts}")}
+    columns = {"battery\nkWh/100 km": battery} | soc
+    if not run.car.electric:
+        columns = fuel | {"battery\nkWh/100 km": battery} | nox | soc | starts
     title = f"{run.car.name}, {driven.strategy} on {run.cycle.name}"
-    table = _table(printable(title), "", "fuel\nl/100 km", "corrected\nl/100 km", "battery\nkWh/100 km",
-                   "NOx\nmg/km", "SOC\nend", "starts\n", "status\n")  # fmt: skip
-    table.add_row(
-        "forward", f"{driven.fuel_l_per_100km:.4f}", number(driven.corrected_l_per_100km, 4),
-        f"{driven.electricity_kwh_per_100km:.3f}", number(driven.nox_mg_per_km, 1), f"{run.soc[-1]:.4f}",
-        f"{run.starts}",
-        Text(", ".join(driven.marks) or "ok"),
-    )  # fmt: skip
-    table.add_row(
-        "backward", number(back.fuel_l_per_100km, 4), number(back.fuel_corrected_l_per_100km, 4),
-        number(back.electricity_kwh_per_100km, 3), number(back.nox_mg_per_km, 1), number(back.soc_end, 4),
-        f"{back.engine_starts}",
-        Text(str(back.status)),
-    )  # fmt: skip
+    table = _table(printable(title), "", *columns, "status\n")
+    for n, name in enumerate(("forward", "backward")):
+        status = ", ".join(driven.marks) or "ok" if n == 0 else str(back.status)
+        table.add_row(name, *(cells[n] for cells in columns.values()), Text(status))
     if driven.bound_l_per_100km is not None:
         bound = f"{driven.bound_l_per_100km:.4f}"
         table.add_row("bound", bound, "", "", "", f"{run.soc[-1]:.4f}", "", "")

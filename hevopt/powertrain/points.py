@@ -14,6 +14,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.car.vehicle import tractive_force_n
 from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
+from hevopt.powertrain._points_kernels import nearest
 from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_table
 from hevopt.problem.arrays import Array
 from hevopt.problem.dwell import with_dwell
@@ -48,9 +49,8 @@ class OperatingPoints(Shown):
             rows = self.by_gear[min(self.by_gear, key=lambda known: (abs(known - gear), known))]
         if speed_mps <= 0.0:
             return rows.first
-        away = ((rows.speed_mps - speed_mps) / SPEED_STEP_MPS) ** 2
-        away += ((rows.wheel_nm - wheel_nm) / TORQUE_STEP_NM) ** 2
-        return rows.first + 1 + int(np.argmin(away))
+        cell = SPEED_STEP_MPS, TORQUE_STEP_NM
+        return rows.first + 1 + nearest(rows.speed_mps, rows.wheel_nm, (speed_mps, wheel_nm), cell)
 
 
 def points_of(car: Architecture, problem: Problem, levels: int = TORQUE_LEVELS) -> OperatingPoints:

@@ -72,7 +72,7 @@ def chemical_power(
     return efficiency * chemical if power < 0.0 else chemical
 
 
-@compiled()
+@compiled(bare=True)
 def chemical_power_at(power: float, energy: float, battery: BatteryArrays) -> float:
     """Rate at which stored energy falls for a terminal power at a stored energy."""
     _, voltage, discharge, charging = state_at(energy, battery)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hevopt import DataError, build_problem, drive, load_architecture, load_cycle
+from hevopt import DataError, InfeasibleError, build_problem, drive, load_architecture, load_cycle
 from hevopt.car.vehicle import tractive_force_n
 from hevopt.driving.cycle import Cycle
 from hevopt.forward._drive_kernels import Look
@@ -175,6 +175,35 @@ def test_points_have_the_charge_of_a_plan_in_any_order(solved):
     first = [stepper.decide(row, problem.start_j, 0) for row in (5, 60, 5)]
     assert all(points.problem.table.feasible[r, c] for r, c in zip((5, 60, 5), first, strict=True))
     assert stepper.memory.row == 5
+
+
+class Failing:
+    """A stepper that fails at its third decision."""
+
+    def __init__(self, stepper, fault):
+        self.stepper, self.fault, self.asked = stepper, fault, 0
+
+    def decide(self, k, energy_j, mode):
+        self.asked += 1
+        if self.asked == 3:
+            raise self.fault
+        return self.stepper.decide(k, energy_j, mode)
+
+
+@pytest.mark.parametrize("engine_model", ["map", "mean_value"])
+def test_what_goes_wrong_in_a_decision_ends_the_loop_and_comes_out_of_it(
+    urban, solved, engine_model
+):
+    car, problem, points, trajectory = solved
+    held = with_holding(points.problem)
+    for fault in (InfeasibleError("nothing left"), KeyboardInterrupt(), ZeroDivisionError("own")):
+        stepper = Failing(a_ecms.start_on(problem, held, 0.5), fault)
+        decider = Decider("failing", stepper, points.problem, points, Asking())
+        with pytest.raises(type(fault)) as told:
+            follow_asked(car, urban, decider, trajectory, step_s=0.05, engine_model=engine_model)
+        assert stepper.asked == 3
+        if isinstance(fault, InfeasibleError):
+            assert "failing: no decision at t = 1 s, gear 1" in str(told.value)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from forward.drives import driven
 
-from hevopt.output.driven_tables import audit
+from hevopt.output.driven_tables import audit, twin_table
 from hevopt.studies.driven import KINDS
 
 
@@ -39,3 +39,13 @@ def test_the_bound_is_that_of_the_runs_own_end_charge():
     assert found.bound_l_per_100km == pytest.approx(found.backward.bound_l_per_100km, rel=2e-3)
     assert found.charge_error == pytest.approx(found.run.soc[-1] - found.backward.soc_end, abs=1e-9)
     assert np.isfinite(found.change_percent)
+
+
+def test_without_an_engine_no_column_of_fuel_is_shown():
+    def heads(name):
+        return [str(column.header).split("\n")[0] for column in twin_table(driven(name)).columns]
+
+    assert heads("electric_compact") == ["", "battery", "SOC", "status"]
+    assert heads("C2") == [
+        "", "fuel", "corrected", "battery", "NOx", "SOC", "starts", "status",
+    ]  # fmt: skip
