@@ -65,7 +65,7 @@ class LoopTask(NamedTuple):
     time_s, speed_mps: (time + 1,); slope_rad: (time,); load_w: (2, time) electric load, engine at rest and not
     from_s, energy_j: (step + 1,); way, engine_on, apart, machine_nm: (step,); others_nm: (step, machine - 1)
     energy_j: what the plan has stored; apart: `open_while` of a ForwardPlan
-    machine_nm, others_nm: of the first machine of a Line, and of those beside it
+    machine_nm, others_nm: of the first machine of a Line, and of those beside it; asks: who fills them on the way
     """
 
     time_s: Array

@@ -61,7 +61,8 @@ class FreeCourse(NamedTuple):
 class FreeWish(NamedTuple):
     """What a step shall do: torque at the wheels, accelerations of wheels and engine's side; what limits it.
 
-    engine_nm: planned, between least_nm and most_nm; turns: whether the engine runs; joined: to the wheels
+    engine_nm: planned, between least_nm and most_nm, or an engine's drag that is stopped; turns: whether it runs
+    joined: to the wheels
     holds: the car is held at rest; least_w, most_w: at the battery's terminals; load_w: electric load
     """
 
@@ -148,7 +149,8 @@ def _within(car: FreeCar, wish: FreeWish, speeds: Array, machine_nm: Array) -> N
     rest -= electric_of(motors, d, 0.0, speeds[d])
     machine_nm[d] = wanted
     for sign, end_w in ((1.0, wish.most_w), (-1.0, -wish.least_w)):
-        if sign * wanted * speeds[d] <= 0.0:
+        # At rest it draws what it loses.
+        if sign * wanted * speeds[d] < 0.0 or (sign < 0.0 and wanted * speeds[d] == 0.0):
             continue
         drawn = rest + electric_of(motors, d, wanted, speeds[d])
         if sign * terminal_w(drawn, limits) <= end_w:
@@ -192,15 +194,23 @@ def _apart(
     wheel, side = _others(row, car, machine_nm)
     wheel = wish.wheel_nm + row[col.PER_W] * wish.accel - wheel
     side = row[col.SIDE_PER_W] * wish.accel - side
-    if not wish.turns:
-        machine_nm[g] = 0.0
-        machine_nm[d] = (wheel + row[col.PER_N] * side_accel) / dw
-        return engine, side_accel
     a, b = wheel - row[col.ENGINE] * engine, side - row[col.SIDE_ENGINE] * engine
     per_nm = 1.0 / (gw * ds - dw * gs)
     still = (a * ds - dw * b) * per_nm
     needed = still + (row[col.PER_N] * ds - dw * row[col.SIDE_PER_N]) * per_nm * side_accel
     most = limit_nm(car.motors, g, speeds[g])
+    if not wish.turns:
+        # A starter brings the engine up; to have it rest the governor takes its momentum as far as it may.
+        low, high = 0.0, 0.0
+        if side_accel < 0.0:
+            slows = min(most, -wish.least_w / max(abs(speeds[g]), 1.0))
+            low, high = (-slows, 0.0) if gs > 0.0 else (0.0, slows)
+            if gs * speeds[g] <= 0.0:
+                low, high = 0.0, 0.0
+        machine_nm[g] = _clip(needed, low, high)
+        wheel -= gw * machine_nm[g] + row[col.ENGINE] * engine
+        machine_nm[d] = (wheel + row[col.PER_N] * side_accel) / dw
+        return engine, side_accel
     low, high = min(still, 0.0) - _PUSH * most, max(still, 0.0) + _PUSH * most
     if gs * speeds[g] > 0.0:
         # What slows the engine charges the battery, as far as that takes it.
@@ -277,13 +287,12 @@ def allotted(
             if wish.holds:
                 machine_nm[car.driving] = 0.0
             _within(car, wish, speeds, machine_nm)
-        given = engine if wish.turns else 0.0
-        solved = SolvedStep(wish.accel, side_accel, given, clutch, wish.joined)
+        solved = SolvedStep(wish.accel, side_accel, engine, clutch, wish.joined)
         found = directions(row, joints, variant, machine_nm, solved, wheel, side, 1.0, 0.0)
         if found == variant:
             break
         variant = found
-    over = row[col.ENGINE] * given + row[col.CLUTCH] * clutch - wish.wheel_nm
+    over = row[col.ENGINE] * engine + row[col.CLUTCH] * clutch - wish.wheel_nm
     over -= row[col.PER_W] * wish.accel + row[col.PER_N] * side_accel
     for m in range(len(machine_nm)):
         over += row[col.MACHINES + col.PER_MACHINE * m] * machine_nm[m]

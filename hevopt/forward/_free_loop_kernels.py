@@ -141,7 +141,9 @@ def _wish(
         ]
         spun_w = spun_nm * (now.side_radps + 0.5 * step_s * side_accel)
         load_w += max(spun_w, 0.0) / limits.spin_efficiency
-    return FreeWish(wheel_nm, accel, side_accel, engine if turns else 0.0, least, most, turns, closing > 0.0,
+    if not turns:
+        engine = by_map(now.side_radps, limits).least_nm if side_accel < 0.0 else 0.0
+    return FreeWish(wheel_nm, accel, side_accel, engine, least, most, turns, closing > 0.0,
                 pedal.holds, braking, least_w, car.motors.most_w, load_w)  # fmt: skip
 
 

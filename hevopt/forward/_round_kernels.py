@@ -10,7 +10,7 @@ from hevopt.forward._solve_kernels import Flow, SolvedStep, directions, joint_to
 SETTLED = 1e-13
 
 
-@compiled(bare=True)
+@compiled(inline="always")
 def row_of(
     ways: Ways, rows: Array, state: State, inputs: Inputs, variant: int, moving: bool, wheel: float,
     gained_wheel: float, gained_side: float, room: Array,

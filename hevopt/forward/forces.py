@@ -70,11 +70,16 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
             torque -= ratio * ways.wheel_yield[way, 0, -1] * lost
         known = (side >= limits.idle_radps) & (side <= limits.engine_max_radps)
         forces.append(np.where(known, torque / radius, np.nan))
-    powers = speed ** np.arange(4)[:, None]
-    resistance = (np.array(driven.body.rolling_n) + np.array(driven.body.air_n)) @ powers
     tyre = driven.body.tyre
     grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
-    return Curves(speed, np.array(forces), resistance, float(grip))
+    return Curves(speed, np.array(forces), resistance_n(driven, speed), float(grip))
+
+
+def resistance_n(driven: LoopCar, speed_mps: Array) -> Array:
+    """(speed,) rolling and air resistance on a level road."""
+    powers = speed_mps ** np.arange(4)[:, None]
+    resistance: Array = (np.array(driven.body.rolling_n) + np.array(driven.body.air_n)) @ powers
+    return resistance
 
 
 def _floored(driven: LoopCar, way: int, wheel: Array, side: Array, boosts: bool) -> Array:
@@ -164,9 +169,11 @@ def slope_at(car: Architecture, curves: Curves, speed_mps: float, handling: Hand
 def start_slope(car: Architecture, driven: LoopCar, handling: Handling, curves: Curves) -> float:
     """Highest slope to start off on: what clutch and engine pass in first gear at launch speed, or the grip.
 
-    Without an engine, and with a torque converter, what the slowest speed of the curves has.
+    Without an engine, with one of a speed of its own, and with a torque converter, what the slowest speed of the
+    curves has.
     """
-    if car.electric or car.driveline.converter is not None:
+    line = car.driveline
+    if car.electric or line.free_engine_speed or line.converter is not None:
         return slope_at(car, curves, float(curves.speed_mps[0]), handling)
     limits, ways = driven.limits, driven.ways
     launch = LAUNCH_RPM / RPM_PER_RADPS

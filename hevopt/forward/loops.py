@@ -45,10 +45,7 @@ class Driving:
         if line.free is None:
             self.breathing = breathing_of(car, engine_model, self._start)
         else:
-            lowest = float(car.engine.law.lowest_nm)
-            self._free = FreeCar(
-                driven, motors_of(car), line.free.governor, line.free.driving, lowest
-            )
+            self._free = free_car(car, line, driven)
 
     @property
     def start_radps(self) -> float:
@@ -75,6 +72,13 @@ class Driving:
             )
         advance = geared.advance if self.breathing is None else self.breathing.advance
         return advance(self._driven, self._task, self._work, loop, first, record, step_s)
+
+
+def free_car(car: Architecture, line: Line, driven: LoopCar) -> FreeCar:
+    """A car whose engine has a speed of its own, as its loop reads it."""
+    assert line.free is not None  # as the engine has
+    lowest = float(car.engine.law.lowest_nm)
+    return FreeCar(driven, motors_of(car), line.free.governor, line.free.driving, lowest)
 
 
 def empty_course(line: Line, decisions: int, machines: int) -> FreeCourse | None:

@@ -14,8 +14,7 @@ from hevopt.forward import _pull_kernels as col
 from hevopt.forward._acting_kernels import LoopCar
 from hevopt.forward._contact_kernels import resistance
 from hevopt.forward._pull_kernels import Foot
-from hevopt.forward.breathing import Breathing, EngineModel, check_engine_model
-from hevopt.forward.drivable import check_geared
+from hevopt.forward.breathing import Breathing, EngineModel, check_steady
 from hevopt.forward.forces import (
     LAUNCH_RPM,
     Curves,
@@ -26,6 +25,7 @@ from hevopt.forward.forces import (
     tabulated,
     top_mps,
 )
+from hevopt.forward.free_pull import FreePull, check_steady_pull
 from hevopt.forward.lines import line_of
 from hevopt.forward.run import loop_car, shifting_of
 from hevopt.problem.arrays import Array, Indices
@@ -104,6 +104,7 @@ class _Floored(NamedTuple):
     foot: Foot
     start_j: float
     engine_model: EngineModel
+    free: FreePull | None
 
 
 def performance(
@@ -119,22 +120,26 @@ def performance(
     """How fast a car is; boosts: whether its machine helps (e_boost); added_kg: people and load.
 
     fills: the machine adds only what the engine lacks of its steady full load while its boost comes
+    A car whose engine has a speed of its own is helped by its battery or, without, goes by what the engine gives.
     boost_lag_s: time constant by which full load comes, 0 for a steady map, which is too quick in the first seconds
     engine_model: "map", or "mean_value", whose turbocharger has a lag of its own
     DataError for a car whose driveline cannot be driven forward, and for boost that its functions lack.
     """
     handling = handling or car.handling
-    check_geared(car, "full pedal")
     _check(car, boosts or fills, added_kg, boost_lag_s, handling, engine_model)
+    check_steady_pull(car, fills, boost_lag_s)
     loaded, line = car.of_mass(car.vehicle.mass_kg + added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
     driven = loop_car(loaded, line, handling._replace(shifting=shifting))
     foot = _foot(car, boosts, fills, boost_lag_s)
     start_j = float(energy_j(car.battery, car.soc_start))
-    floored = _Floored(loaded, driven, by_gear(line), foot, start_j, engine_model)
+    free = FreePull(loaded, line, driven, boosts) if line.free is not None else None
+    floored = _Floored(loaded, driven, by_gear(line), foot, start_j, engine_model, free)
     trace = _pulled(floored, 0.0, 0, max(SPEEDS_KMH), max(DISTANCES_M))
-    curves = forces_of(loaded, line, driven, boosts or car.electric)
-    engine = forces_of(loaded, line, driven, False) if boosts else curves
+    curves, engine = (
+        free.curves(helps) if free else forces_of(loaded, line, driven, helps)
+        for helps in (boosts or car.electric, car.electric)
+    )  # fmt: skip
     in_gear = _in_gear(floored)
     used, helps = _to_100_j(trace, start_j), boosts or fills
     return Performance(
@@ -176,7 +181,7 @@ def _check(
         raise DataError(
             f"added mass {added_kg:g} kg, boost lag {boost_lag_s:g} s; allowed: -200 to 5000 kg, 0 to 10 s"
         )
-    check_engine_model(engine_model)
+    check_steady(car, engine_model)
     if engine_model == "mean_value" and boost_lag_s > 0:
         raise DataError(
             f"boost lag {boost_lag_s:g} s beside engine model mean_value, whose turbocharger has a lag of its own; "
@@ -192,6 +197,9 @@ def _pulled(
     driven, ways, foot = floored.driven, floored.ways, floored.foot
     start = speed_mps, place, floored.start_j
     record: Array = np.zeros((round(_LONGEST_S / STEP_S), col.COLUMNS))
+    if floored.free is not None:
+        until = until_kmh / KMH_PER_MPS, until_m
+        return floored.free.pulled(speed_mps, floored.start_j, until, STEP_S, len(record))
     work = col.pull_work(driven)
     if floored.engine_model == "map":
         col.pull(driven, ways, foot, work, start, STEP_S, record)
@@ -273,7 +281,7 @@ def _in_gear(floored: _Floored) -> dict[tuple[int, int, int], tuple[float, float
     """
     driven, ways = floored.driven, floored.ways
     held = floored._replace(foot=floored.foot._replace(up_radps=np.inf))
-    lowest = 1 if floored.car.electric else 3
+    lowest = 1 if floored.car.electric or floored.free is not None else 3
     cases = [(gear, *pair) for gear in range(lowest, len(ways) + 1) for pair in IN_GEAR_KMH]
     if len(ways) >= 4:
         cases.append((4, *FOURTH_KMH))
@@ -281,7 +289,9 @@ def _in_gear(floored: _Floored) -> dict[tuple[int, int, int], tuple[float, float
     for gear, low, high in cases:
         ratio = driven.ways.wheel[ways[gear - 1], -1] / driven.body.radius_m / KMH_PER_MPS
         found[gear, low, high] = None
-        if ratio * low < driven.limits.idle_radps or ratio * high > driven.limits.engine_max_radps:
+        turns = ratio * low >= driven.limits.idle_radps
+        turns &= ratio * high <= driven.limits.engine_max_radps
+        if floored.free is None and not turns:
             continue
         trace = _pulled(held, low / KMH_PER_MPS, gear - 1, high)
         time = _first(trace[:, col.SPEED], high / KMH_PER_MPS)

@@ -137,7 +137,10 @@ def test_what_such_a_car_is_not_driven_by_is_told():
     car = load_architecture("prius_1998")
     with pytest.raises(DataError, match="driven by its map only; leave --engine-model mean_value"):
         drive(car, hill(), "ecms", engine_model="mean_value")
-    with pytest.raises(DataError, match="full pedal is for an engine behind clutch and gears"):
-        performance(car)
+    with pytest.raises(DataError, match="driven by its map only; leave --engine-model mean_value"):
+        performance(car, engine_model="mean_value")
+    for options in ({"boost_lag_s": 0.5}, {"fills": True}):
+        with pytest.raises(DataError, match="no lag here"):
+            performance(car, **options)
     with pytest.raises(DataError, match="under commands is for an engine behind clutch and gears"):
         CommandedCar(car)
