@@ -34,7 +34,12 @@ _HALVINGS = 20
 # Forces that are the same within this share.
 _SAME = 1e-6
 # How much more than at steady speed is asked for, and for how many steps.
-_ASKED, _PIECE = 1.2, 5
+_ASKED, _PIECE = 1.05, 5
+# Share of the battery's power that is asked for: what the wheels accelerate otherwise than asked is the governor's
+# to take up within a step, out of the rest [E].
+_RESERVED = 0.95
+# What losses take from the battery beside what it gives, at most: as much again.
+_SPARE = 2.0
 _FOR_EVER_S = 1e9
 
 
@@ -54,7 +59,9 @@ class FreePull:
         still = DriverGains(*[0.0] * len(DriverGains._fields))._replace(
             governor_s=driven.driver.governor_s, start_s=driven.driver.start_s
         )
-        self._car = free_car(car, line, driven._replace(driver=still))
+        whole = free_car(car, line, driven._replace(driver=still))
+        motors = whole.motors._replace(most_w=_RESERVED * whole.motors.most_w)
+        self._car = whole._replace(motors=motors)
         self._loads_w = own_loads_w(car)
         self._work = drive.work_of(driven.ways)
         self.speed_mps = np.linspace(_LOWEST_MPS, _HIGHEST_MPS, _SPEEDS)
@@ -86,10 +93,12 @@ class FreePull:
         rows = np.zeros((steps, drive.COLUMNS + len(self._work.machine_nm) - 1))
         done = 0
         for first in range(0, steps, _PIECE):
-            loop = self._ordered(loop, course)
-            part, car = rows[first : first + _PIECE], self._car
-            if self.helped is None or loop.energy_j <= car.loop.window_j[0]:
-                car = car._replace(motors=car.motors._replace(most_w=0.0))
+            part, car, best = rows[first : first + _PIECE], self._car, self.helped
+            # What a piece may take is left above the window's lower end.
+            left_j = loop.energy_j - car.loop.window_j[0]
+            if best is None or left_j <= _SPARE * step_s * _PIECE * car.motors.most_w:
+                best, car = self.alone, car._replace(motors=car.motors._replace(most_w=0.0))
+            loop = self._ordered(loop, course, best)
             loop = free.advance(car, task, course, self._work, loop, first, part, step_s)
             done = first + len(part)
             moved_m = step_s * float(np.sum(rows[:done, drive.SPEED]))
@@ -108,15 +117,10 @@ class FreePull:
         top = self._car.motors.top_radps[self._car.governor]
         return float(max(idle, min((-top - own) / per, (top - own) / per)))
 
-    def _ordered(self, loop: free.FreeLoop, course: FreeCourse) -> free.FreeLoop:
+    def _ordered(self, loop: free.FreeLoop, course: FreeCourse, best: Fullest) -> free.FreeLoop:
         """The loop with the pedal floored; course: filled for the speed that it has."""
-        empty = loop.energy_j <= self._car.loop.window_j[0]
-        best = self.alone if self.helped is None or empty else self.helped
-        k = int(
-            np.clip(
-                np.rint((loop.state.speed_mps - _LOWEST_MPS) / self._between_mps), 0, _SPEEDS - 1
-            )
-        )
+        place = (loop.state.speed_mps - _LOWEST_MPS) / self._between_mps
+        k = min(max(round(place), 0), _SPEEDS - 1)
         course.engine_radps[0], course.engine_nm[0] = best.engine_radps[k], best.engine_nm[k]
         course.closed[0] = best.closed[k]
         force = min(_ASKED * float(best.force_n[k]), self._grip_n)
