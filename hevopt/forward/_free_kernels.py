@@ -183,14 +183,8 @@ def _apart(
 ) -> tuple[float, float]:
     """Torques of both machines while nothing joins engine and wheels; the engine's, and its side's acceleration."""
     g, d, engine, side_accel = car.governor, car.driving, wish.engine_nm, wish.side_accel
-    gw, gs = (
-        row[col.MACHINES + col.PER_MACHINE * g],
-        row[col.MACHINES + col.PER_MACHINE * g + 1],
-    )
-    dw, ds = (
-        row[col.MACHINES + col.PER_MACHINE * d],
-        row[col.MACHINES + col.PER_MACHINE * d + 1],
-    )
+    of_g, of_d = col.MACHINES + col.PER_MACHINE * g, col.MACHINES + col.PER_MACHINE * d
+    gw, gs, dw, ds = row[of_g], row[of_g + 1], row[of_d], row[of_d + 1]
     wheel, side = _others(row, car, machine_nm)
     wheel = wish.wheel_nm + row[col.PER_W] * wish.accel - wheel
     side = row[col.SIDE_PER_W] * wish.accel - side
@@ -201,13 +195,11 @@ def _apart(
     most = limit_nm(car.motors, g, speeds[g])
     if not wish.turns:
         # A starter brings the engine up; to have it rest the governor takes its momentum as far as it may.
-        low, high = 0.0, 0.0
-        if side_accel < 0.0:
-            slows = min(most, -wish.least_w / max(abs(speeds[g]), 1.0))
-            low, high = (-slows, 0.0) if gs > 0.0 else (0.0, slows)
-            if gs * speeds[g] <= 0.0:
-                low, high = 0.0, 0.0
-        machine_nm[g] = _clip(needed, low, high)
+        slows = most if side_accel < 0.0 else 0.0
+        if gs * speeds[g] > 0.0:
+            slows = min(slows, -wish.least_w / max(abs(speeds[g]), 1.0))
+        held = -slows if gs > 0.0 else slows
+        machine_nm[g] = _clip(needed, min(held, 0.0), max(held, 0.0))
         wheel -= gw * machine_nm[g] + row[col.ENGINE] * engine
         machine_nm[d] = (wheel + row[col.PER_N] * side_accel) / dw
         return engine, side_accel

@@ -18,7 +18,7 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.lines import Line
 from hevopt.forward.slipping import slipping
 from hevopt.problem._battery_kernels import trace
-from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import step_flows
 
 # Share by which the loop keeps idle speed.
@@ -75,19 +75,12 @@ def turning_of(
     if before is not None:
         at_start = before[None, [col.WAY, col.FROM_WAY, col.BLEND]]
     moved = np.vstack([at_start, record[:, [col.WAY, col.FROM_WAY, col.BLEND]]])
-    way, from_way, blend = moved[:, 0].astype(int), moved[:, 1].astype(int), moved[:, 2]
-    rates = line.ways.wheel, line.ways.side
-    by_wheel, by_side = (_rates(rate, way, from_way, blend) for rate in rates)
+    way, from_way, blend = moved[:, 0].astype(int), moved[:, 1].astype(int), moved[:, 2:]
+    by_wheel, by_side = (
+        (rate[way] + blend * (rate[from_way] - rate[way])).T
+        for rate in (line.ways.wheel, line.ways.side)
+    )
     return Turning(wheel, side, by_wheel * wheel + by_side * side, by_wheel * wheel, spin)
-
-
-def _rates(rate: Array, way: Indices, from_way: Indices, blend: Array) -> Array:
-    """(unit, step) what units turn per speed of the wheels, or of the engine's side."""
-    found: Array = np.ascontiguousarray(rate.T)[:, way]
-    moves = np.flatnonzero(blend)
-    end, begin = rate[way[moves]], rate[from_way[moves]]
-    found[:, moves] = (end + blend[moves, None] * (begin - end)).T
-    return found
 
 
 def books_of(
@@ -111,12 +104,12 @@ def books_of(
         flows |= slipping(car, record, turning.wheel, turning.spin, flows["kinetic_w"], step_s)
     flows["auxiliary_power_w"] = load_w
     flows |= _joints(line, record, turning, step_s)
-    flows |= _burnt(car, flows, None if breath is None else breath[:, gas.FUEL] / step_s)
+    turns = record[:, col.PHASE] == motor.TURNING
+    flows |= _burnt(car, flows, turns, None if breath is None else breath[:, gas.FUEL] / step_s)
     if breath is not None:
         flows |= _breath(flows, breath)
     spin = max(machine.spin_efficiency for machine in car.machines)
-    starter = np.maximum(flows["start_w"], 0.0) / spin
-    flows["starter_electric_w"] = starter
+    flows["starter_electric_w"] = starter = np.maximum(flows["start_w"], 0.0) / spin
     electric = flows["machine_electric_w"] + flows["auxiliary_power_w"] + starter
     terminal = car.terminal_w(electric)
     if car.converter is not None:
@@ -256,11 +249,10 @@ def _breath(flows: Mapping[str, Array], breath: Array) -> dict[str, Array]:
 
 
 def _burnt(
-    car: Architecture, flows: Mapping[str, Array], own_kgps: Array | None
+    car: Architecture, flows: Mapping[str, Array], turns: Flags, own_kgps: Array | None
 ) -> dict[str, Array]:
     """Fuel, NOx and the machine's electric power, by the car's own components; own_kgps: fuel not by the map."""
     torque, speed = flows["engine_torque_nm"], flows["engine_speed_radps"]
-    turns = (speed > 0) & (flows["start_w"] == 0) & (flows["stop_w"] == 0)
     # At idle speed and at full load, where a measured map may end.
     idle = car.engine.idle_radps
     speed = np.where((speed < idle) & (speed > idle * (1 - _EDGE)), idle, speed)

@@ -207,7 +207,9 @@ def _force_n(
     def governor_nm(driving_nm: Array) -> Array:
         if joined:
             return np.zeros(shape)
-        return -(row[col.SIDE_ENGINE] * engine_nm + at_side[1] * driving_nm) / at_side[0]
+        left = row[col.SIDE_ENGINE] * engine_nm + at_side[1] * driving_nm
+        held: Array = -left / at_side[0]
+        return held
 
     def drawn_w(driving_nm: Array) -> Array:
         given = zip((g, d), (governor_nm(driving_nm), driving_nm), (radps_g, radps_d), strict=True)

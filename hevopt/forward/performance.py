@@ -120,20 +120,18 @@ def performance(
     """How fast a car is; boosts: whether its machine helps (e_boost); added_kg: people and load.
 
     fills: the machine adds only what the engine lacks of its steady full load while its boost comes
-    A car whose engine has a speed of its own is helped by its battery or, without, goes by what the engine gives.
     boost_lag_s: time constant by which full load comes, 0 for a steady map, which is too quick in the first seconds
     engine_model: "map", or "mean_value", whose turbocharger has a lag of its own
     DataError for a car whose driveline cannot be driven forward, and for boost that its functions lack.
     """
     handling = handling or car.handling
     _check(car, boosts or fills, added_kg, boost_lag_s, handling, engine_model)
-    check_steady_pull(car, fills, boost_lag_s)
     loaded, line = car.of_mass(car.vehicle.mass_kg + added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
     driven = loop_car(loaded, line, handling._replace(shifting=shifting))
     foot = _foot(car, boosts, fills, boost_lag_s)
     start_j = float(energy_j(car.battery, car.soc_start))
-    free = FreePull(loaded, line, driven, boosts) if line.free is not None else None
+    free = FreePull(loaded, line, driven, boosts) if line.free else None
     floored = _Floored(loaded, driven, by_gear(line), foot, start_j, engine_model, free)
     trace = _pulled(floored, 0.0, 0, max(SPEEDS_KMH), max(DISTANCES_M))
     curves, engine = (
@@ -163,6 +161,7 @@ def performance(
 
 def _foot(car: Architecture, boosts: bool, fills: bool, boost_lag_s: float) -> Foot:
     """The pedal floored; a car without an engine launches and changes up at no speed of it, all by its machine."""
+    check_steady_pull(car, fills, boost_lag_s)
     up = min(UP_RPM, _UP_SHARE * RPM_PER_RADPS * car.engine.speed_max_radps)
     launch, up = (0.0, np.inf) if car.electric else (LAUNCH_RPM, up)
     helps = boosts or fills or car.electric
