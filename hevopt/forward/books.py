@@ -21,10 +21,9 @@ from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import step_flows
 
-# Share by which the loop keeps idle speed.
-_EDGE = 1e-4
-# Share by which full load at a step's beginning may be above that of its mean speed.
-_AHEAD = 2e-3
+# Share by which the loop keeps idle speed, and knows full load by its table; and where a map ends there, by which
+# full load at a step's beginning may be above that of its mean speed.
+_EDGE, _AHEAD = 1e-4, 2e-3
 CAUSES = {motor.LAUNCH: "launch", motor.CHANGE: "change", motor.START: "start", motor.NONE: "other"}
 
 
@@ -257,7 +256,9 @@ def _burnt(
     idle = car.engine.idle_radps
     speed = np.where((speed < idle) & (speed > idle * (1 - _EDGE)), idle, speed)
     most = car.engine.covered_nm(np.where(turns, speed, idle))
-    torque = np.where((torque > most) & (torque < most * (1 + _AHEAD)), most, torque)
+    unknown = np.isnan(car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)))
+    edge = np.where(unknown, _AHEAD, _EDGE)
+    torque = np.where((torque > most) & (torque < most * (1 + edge)), most, torque)
     fuel = np.where(turns, car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)), 0.0)
     by_map = {} if own_kgps is None else {"map_fuel_kgps": fuel}
     fuel = fuel if own_kgps is None else own_kgps
