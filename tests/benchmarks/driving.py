@@ -127,7 +127,8 @@ def main():
     text = [
         "# Benchmarks of driving",
         "",
-        "Made by `python tests/benchmarks/driving.py`: the NEDC at 100 Hz, processor time, the least of "
+        f"Made by `python {' '.join(['tests/benchmarks/driving.py', *sys.argv[1:]])}`: the NEDC at 100 Hz, "
+        "processor time, the least of "
         f"{REPEATS - 1}; the machine is shared, so that other work shows.",
         "",
         f"Machine: {machine()}.",
