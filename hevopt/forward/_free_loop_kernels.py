@@ -31,7 +31,7 @@ from hevopt.forward._free_kernels import (
     may_not_rest,
     side_after,
 )
-from hevopt.forward._limits_kernels import by_map, limit_nm
+from hevopt.forward._limits_kernels import by_map, limit_nm, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State
@@ -43,6 +43,8 @@ _FEEDBACK_SPEED_RADPS = 50.0
 _FASTER, _STOPS_BELOW = 1.1, 1.05
 # Rounds in which the governor takes over what the engine's torque is off, and the share of it that is rounding.
 _ROUNDS, _SAME = 4, 1e-12
+# Of the share of a start that the battery has power for.
+_HALVINGS = 30
 
 
 class FreeLoop(NamedTuple):
@@ -105,6 +107,32 @@ def _clutch_closing(
 
 
 @compiled(bare=True)
+def _started(
+    car: FreeCar, row: Array, side: float, accel: float, side_accel: float, load_w: float, step_s: float
+) -> tuple[float, float]:  # fmt: skip
+    """Acceleration of an engine that is started, as far as the battery has power for it, and the load with that.
+
+    side, accel, side_accel: speed of the engine's side, rad/s, and accelerations of wheels and side that are asked
+    """
+    limits = car.loop.limits
+    low, high, share, load = 0.0, 1.0, 1.0, load_w
+    for _ in range(_HALVINGS):
+        reached = share * side_accel
+        spun_nm = (row[col.SIDE_PER_N] * reached + row[col.SIDE_PER_W] * accel) / row[
+            col.SIDE_ENGINE
+        ]
+        spun_w = max(spun_nm * (side + 0.5 * step_s * reached), 0.0) / limits.spin_efficiency
+        if terminal_w(load_w + spun_w, limits) <= car.motors.most_w:
+            low, load = share, load_w + spun_w
+            if share == 1.0:
+                break
+        else:
+            high = share
+        share = 0.5 * (low + high)
+    return low * side_accel, load
+
+
+@compiled(bare=True)
 def _wish(
     car: FreeCar, task: LoopTask, course: FreeCourse, row: Array, now: Now, loop: FreeLoop, pedal: PedalState,
     phase: int, closing: float, step_s: float,
@@ -121,6 +149,9 @@ def _wish(
     more = min(1.0 + beyond / max(gives.most_nm, 1.0), _FASTER)
     side_accel = side_after(car, course, now, phase, ahead, step_s, more) - now.side_radps
     side_accel /= step_s
+    load_w = task.load_w[0 if phase == motor.REST else 1, now.k]
+    if phase == motor.STARTING:
+        side_accel, load_w = _started(car, row, now.side_radps, accel, side_accel, load_w, step_s)
     after = by_map(now.side_radps + step_s * side_accel, limits)
     least, most = min(gives.least_nm, after.least_nm), min(gives.most_nm, after.most_nm)
     engine = least
@@ -134,13 +165,6 @@ def _wish(
     least_w = car.motors.least_w
     if now.energy_j >= car.loop.window_j[1] or (braking and not limits.regenerates):
         least_w = 0.0
-    load_w = task.load_w[0 if phase == motor.REST else 1, now.k]
-    if phase == motor.STARTING:
-        spun_nm = (row[col.SIDE_PER_N] * side_accel + row[col.SIDE_PER_W] * accel) / row[
-            col.SIDE_ENGINE
-        ]
-        spun_w = spun_nm * (now.side_radps + 0.5 * step_s * side_accel)
-        load_w += max(spun_w, 0.0) / limits.spin_efficiency
     if not turns:
         engine = by_map(now.side_radps, limits).least_nm if side_accel < 0.0 else 0.0
     return FreeWish(wheel_nm, accel, side_accel, engine, least, most, turns, closing > 0.0,

@@ -211,6 +211,6 @@ class CommandedCar:
                          slips=self._slips)  # fmt: skip
         if np.isfinite(before.stored_j):  # else a measured map has ended on the way
             times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
-            check_charge(self.car, books, times)
+            check_charge(self.car, books, record, times)
         was = motor.REST if before.row is None else int(before.row[col.PHASE])
         return books, starts_of(phase, was)

@@ -243,7 +243,7 @@ def run_of(
     start = start_mps, side, float(planned_j[0])
     slips = handling.tyre.slips
     books = books_of(car, line, record, start, step_s, load_w, breath, slips=slips)
-    check_charge(car, books, time_s)
+    check_charge(car, books, record, time_s)
     speed = np.append(start_mps, record[:, col.SPEED])
     wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)
     phase = record[:, col.PHASE].astype(np.int64)
@@ -275,12 +275,16 @@ def check_step(step_s: float, handling: Handling) -> None:
     check_gains(handling.driver, handling.tyre, step_s)
 
 
-def check_charge(car: Architecture, books: Books, time_s: Array) -> None:
-    """DataError where the battery is empty; time_s: (step + 1,)."""
-    lost = ~np.isfinite(books.energy_j) & ~books.off_map.any()
-    lost |= books.energy_j < 0
+def check_charge(car: Architecture, books: Books, record: Array, time_s: Array) -> None:
+    """DataError where the battery is empty, or its power too little; record: of the loop; time_s: (step + 1,)."""
+    beyond = ~np.isfinite(books.energy_j) & ~books.off_map.any()
+    # Outside a measured map no energy is known either, and that is told with the run.
+    beyond[1:] |= np.diff(~np.isfinite(record[:, col.ENERGY]), prepend=False) & ~books.off_map
+    lost = beyond | (books.energy_j < 0)
     if lost.any():
+        first = int(np.argmax(lost))
+        said = "cannot give the power that is asked of it" if beyond[first] else "is empty"
         raise DataError(
-            f"{car.name}: the battery is empty at t = {time_s[int(np.argmax(lost))]:g} s; raise soc_start, choose "
-            "a larger battery or a lower electric load"
+            f"{car.name}: the battery {said} at t = {time_s[first]:g} s; raise soc_start, choose a larger battery "
+            "or a lower electric load"
         )

@@ -9,11 +9,13 @@ from forward.drives import constant
 from hevopt import DataError, build_problem, load_architecture, load_cycle, simulate
 from hevopt.car.handling import DriverGains, Handling
 from hevopt.driving.cycle import Cycle
+from hevopt.forward import _drive_kernels as col
 from hevopt.forward.commanded import CommandedCar
 from hevopt.forward.lines import line_of
 from hevopt.forward.performance import performance
 from hevopt.forward.plans import replay_of
-from hevopt.forward.run import follow
+from hevopt.forward.run import check_charge, follow
+from hevopt.problem.battery import power_limits_w
 from hevopt.strategies import STRATEGIES
 from hevopt.studies.driven import drive
 
@@ -125,6 +127,53 @@ def test_a_fuel_cell_gives_its_planned_power(tmp_path):
     run = follow(car, cycle, replay_of(trajectory, line_of(car)), step_s=0.05, handling=OPEN_LOOP)
     assert max(run.residual.values()) < 1e-9 and not run.books.off_map.any()
     assert run.fuel_kg == pytest.approx(trajectory.total_fuel_kg, rel=0.02)
+
+
+# The second machine turns five times as fast as the engine: to start one is to start the other.
+COMPOUND = """
+name = "compound"
+car = "car_prius_1998"
+engine = "engine_petrol_1500_atkinson"
+battery = "battery_nimh_40"
+machine = "machine_motor_30kw"
+machine_2 = "machine_motor_30kw"
+functions = ["start_stop", "e_boost", "regenerative_braking", "power_management"]
+
+[coupling]
+kind = "parts"
+engine_shaft = "engine"
+machine_shaft = "a"
+machine_2_shaft = "b"
+parts = [
+  { kind = "planetary", name = "set 1", sun = "a", ring = "engine", carrier = "out", efficiency = 0.98, ratio = 2 },
+  { kind = "planetary", name = "set 2", sun = "b", ring = "a", carrier = "out", efficiency = 0.98, ratio = 2.5 },
+  { kind = "gear", name = "final drive", first = "out", second = "wheel", ratio = 2.6, efficiency = 0.97 },
+]
+"""
+
+
+def test_a_start_takes_no_more_power_than_the_battery_gives(tmp_path):
+    path = tmp_path / "compound.toml"
+    path.write_text(COMPOUND)
+    car, cycle = load_architecture(path), hill()
+    problem = build_problem(car, cycle, allow_shortfall=True)
+    trajectory = simulate(problem, STRATEGIES["ecms"].solve(problem).control)
+    run = follow(car, cycle, replay_of(trajectory, line_of(car)), step_s=0.05)
+    assert run.starts > 0 and np.isfinite(run.fuel_kg) and np.isfinite(run.energy_j).all()
+    # In the one step that all shafts turn alike, which way power goes through the teeth is undecided.
+    off = np.sort(np.abs(run.books.residuals["driveline"]))
+    assert off[-2] < 1e-6 and max(run.residual.values()) < 1e-5
+    started = run.books.flows["starter_electric_w"] > 0
+    most_w = power_limits_w(car.battery)[1]
+    assert run.books.flows["battery_power_w"][started].max() <= most_w * (1 + 1e-9)
+
+
+def test_power_that_no_battery_gives_is_told_with_its_time():
+    car, run = planned("prius_1998")[0], run_of("prius_1998")
+    record = np.zeros((len(run.time_s) - 1, col.COLUMNS + 1))
+    record[7:, col.ENERGY] = np.nan
+    with pytest.raises(DataError, match=r"cannot give the power that is asked of it at t = 0\.4 s"):
+        check_charge(car, run.books, record, run.time_s)
 
 
 def test_a_strategy_that_decides_is_asked_on_the_way():
