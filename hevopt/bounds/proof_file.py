@@ -99,6 +99,7 @@ def _battery_arrays(problem: Problem) -> dict[str, NDArray[Any]]:
     # Of (mode, mode), or of the first step of (time, mode, mode).
     taken = problem.table.switch_energy_j
     begins = problem.start_j - taken.reshape(-1, *taken.shape[-2:])[0, problem.start_mode]
+    begins = np.clip(begins, low, high)
     near = np.concatenate([begins - _NEAR * high, begins + _NEAR * high])
     points = np.unique(np.concatenate([inside.energy_j, even, near]))
     points = points[(points >= low) & (points <= high)]
