@@ -33,6 +33,9 @@ from hevopt.strategies._rules_driven import DrivenRule
 _POWERS, _SPEEDS = 24, 12
 _SOC_SHARES = np.linspace(0.05, 0.5, 10)
 _ROUNDS = 8
+# Screened is every third value of each threshold. With every fourth, members passed over burnt up to 8 % less, with
+# every third up to 0.5 % (19 cars and cycles).
+_COARSE = 3
 
 
 def start(
@@ -50,7 +53,7 @@ def start(
         np.asarray(usual if own is None else own, dtype=np.float64)
         for own, usual in zip(asked, _axes(rules), strict=True)
     ]
-    coarse = [np.unique(np.append(axis[::4], axis[-1])) for axis in axes]
+    coarse = [np.unique(np.append(axis[::_COARSE], axis[-1])) for axis in axes]
     near = [ElectricLimits(*limits) for limits in product(*coarse)]
     quick, exact = _Judged(rules, engine, quick=True), _Judged(rules, engine, quick=False)
     centre = near[int(np.argmin(_ranked(rules, quick.figures(near))))]

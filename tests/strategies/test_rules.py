@@ -1,5 +1,7 @@
 """The rules: thresholds calibrated together or given by the file, load shifted up and down."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,14 @@ from hevopt.strategies import _family_kernels as family
 from hevopt.strategies import _neutral_kernels as neutral
 from hevopt.strategies import _rule_kernels as kernels
 from hevopt.strategies import conventional
-from hevopt.strategies._rules import ElectricLimits, engine_entries, figures_of, rules_of
+from hevopt.strategies._rules import (
+    ElectricLimits,
+    corrected_kg,
+    eligible,
+    engine_entries,
+    figures_of,
+    rules_of,
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +65,15 @@ def test_no_member_on_a_line_through_the_one_taken_burns_less(plan):
         assert member["corrected_kg"] >= best["corrected_kg"] or not member["eligible"]
     for key in keys:
         assert len({member[key] for member in plan.notes["calibration"]}) > 9
+
+
+@pytest.mark.parametrize(("car", "cycle"), [("p4_diesel", "udds"), ("ioniq_2021", "udds")])
+def test_of_the_whole_family_hardly_any_member_burns_less(car, cycle):
+    rules = rules_of(build_problem(load_architecture(car), load_cycle(cycle)))
+    family_of = [ElectricLimits(*limits) for limits in product(*conventional._axes(rules))]
+    figures = figures_of(rules, family_of, engine_entries(rules))
+    least = np.min(corrected_kg(rules, figures)[eligible(rules, figures)])
+    assert taken(conventional.solve(rules.problem))["corrected_kg"] <= least * 1.005
 
 
 def test_three_thresholds_burn_less_than_one(problem, plan):
