@@ -67,13 +67,13 @@ def test_no_member_on_a_line_through_the_one_taken_burns_less(plan):
         assert len({member[key] for member in plan.notes["calibration"]}) > 9
 
 
-@pytest.mark.parametrize(("car", "cycle"), [("p4_diesel", "udds"), ("ioniq_2021", "udds")])
+@pytest.mark.parametrize(("car", "cycle"), [("p4_diesel", "udds"), ("prius_prime_2017", "udds")])
 def test_of_the_whole_family_hardly_any_member_burns_less(car, cycle):
     rules = rules_of(build_problem(load_architecture(car), load_cycle(cycle)))
     family_of = [ElectricLimits(*limits) for limits in product(*conventional._axes(rules))]
     figures = figures_of(rules, family_of, engine_entries(rules))
     least = np.min(corrected_kg(rules, figures)[eligible(rules, figures)])
-    assert taken(conventional.solve(rules.problem))["corrected_kg"] <= least * 1.005
+    assert taken(conventional.solve(rules.problem))["corrected_kg"] <= least * 1.002
 
 
 def test_three_thresholds_burn_less_than_one(problem, plan):
