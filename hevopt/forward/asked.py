@@ -218,13 +218,16 @@ class _Orders:
             course.machine_nm[d], course.closed[d] = command.machines_nm, command.closed
 
     def _answer(self, d: int) -> int:
-        speed_mps, wheel_nm, energy_j = self._told.tolist()
-        try:
-            self.decide(d, col.Look(speed_mps, wheel_nm), energy_j)
-        except BaseException as fault:  # nothing passes a compiled loop
-            self.fault = fault
-            return 1
-        return 0
+        if self.fault is None:
+            speed_mps, wheel_nm, energy_j = self._told.tolist()
+            try:
+                self.decide(d, col.Look(speed_mps, wheel_nm), energy_j)
+                return 0
+            except BaseException as fault:  # nothing passes a compiled loop
+                self.fault = fault
+        # A loop that is driven on in pieces asks again at once, and ends again.
+        self.task.asks.last[0] = -1
+        return 1
 
 
 def _coasts(car: Architecture, command: Decision, look: col.Look) -> bool:

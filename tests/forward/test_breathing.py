@@ -84,7 +84,7 @@ def floored(name, **help_):
     driven_ = loop_car(car, line, car.handling._replace(shifting=shifting_of(car)))
     foot = pulling.Foot(188.5, 440.0, bool(help_), help_.get("fills", False), 0.0, 0.45)
     start_j = float(energy_j(car.battery, car.soc_start))
-    return _Floored(car, driven_, by_gear(line), foot, start_j, "mean_value")
+    return _Floored(car, driven_, by_gear(line), foot, start_j, "mean_value", None)
 
 
 def to_80(of):
