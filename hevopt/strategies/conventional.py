@@ -33,8 +33,8 @@ from hevopt.strategies._rules_driven import DrivenRule
 _POWERS, _SPEEDS = 24, 12
 _SOC_SHARES = np.linspace(0.05, 0.5, 10)
 _ROUNDS = 8
-# Screened is every second value of each threshold: with every fourth, members passed over burnt up to 8 % less, with
-# every third up to 1 %, with these up to 0.1 % (9 cars and cycles, against the whole family).
+# Screened is every second value of each threshold: with every fourth, members passed over burnt up to 8 % less,
+# with every third up to 1 %, with these up to 0.1 % (9 cars and cycles, against the whole family).
 _COARSE = 2
 
 
