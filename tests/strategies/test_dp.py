@@ -173,7 +173,11 @@ def test_a_quick_look_is_taken_only_where_it_is_proven_to_be_enough(problem_of, 
 
     assert looked(1e-12) > len(dp._QUICK) and len(gaps) == 2 and anew()
     first, second = gaps
-    assert second < first and looked((first + second) / 2) == 3
+    assert second <= first
+    if second < first:  # of B; where another band gains nothing, no gap lies between
+        assert looked((first + second) / 2) == 3
+    else:
+        assert name != "B"
     assert looked(first) == 2 and grids[0][3] < grids[1][3]
     # Nearly proven: bands narrow on, none begins anew.
     nearly = looked(second / 2)

@@ -129,7 +129,9 @@ def test_studies_of_a_refined_comparison_are_refined(hevopt, quick):
     assert status == 0, err
     results = load_results(Path("s.gz"))
     row = results.rows[0].figures
-    assert results.pareto[0].points[0].fuel_l_per_100km == row.fuel_l_per_100km
+    # Plans of the same table, each within 5e-5 of its optimum; on the table that is not refined fuel is 2e-4 more.
+    front = results.pareto[0].points[0].fuel_l_per_100km
+    assert front == pytest.approx(row.fuel_l_per_100km, rel=5e-5)
     for effect in results.sensitivity:
         if effect.strategy == "dp":
             assert row.fuel_corrected_l_per_100km in effect.fuel_l_per_100km
