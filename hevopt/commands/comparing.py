@@ -234,6 +234,20 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
         show(cold_table(job.cold))
 
 
+def ready_to_show(job: ComparisonJob) -> None:
+    """Do what `show_comparison` needs beside the rows: read the published study, and whatever a table is written
+    with, by one without rows."""
+    from hevopt.output.beside_tables import published_table
+    from hevopt.output.tables import needed_width
+    from hevopt.output.terminal_tables import comparison_table
+    from hevopt.studies.comparison import Comparison
+
+    nothing = Comparison(job.trace.name, [])
+    needed_width(comparison_table(nothing))
+    if job.is_study:
+        published_table(nothing)
+
+
 def show_comparison(
     job: ComparisonJob, comparison: "Comparison", *, json: bool, wide: bool
 ) -> None:

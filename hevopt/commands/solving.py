@@ -101,7 +101,7 @@ def compare(
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
     from hevopt.commands.brought import brought_to
-    from hevopt.commands.comparing import ComparisonJob, Files, show_comparison
+    from hevopt.commands.comparing import ComparisonJob, Files, ready_to_show, show_comparison
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies import comparison as study
@@ -128,7 +128,7 @@ def compare(
     )
     say_how_long(job.trace, compared)
     with Progress() as progress:
-        watch = Watch(progress, files.observer(cold))
+        watch = Watch(progress, files.observer(cold), partial(ready_to_show, job))
         comparison = compared(job.trace, watch=watch, may_fork=True)
     # Before the files, which may take long: what is solved is seen whatever becomes of them.
     show_comparison(job, comparison, json=json, wide=wide)

@@ -10,7 +10,7 @@ from hevopt.errors import HevoptError, InfeasibleError, SolverError, UnknownNoxE
 from hevopt.problem.problem import Plan, Trajectory
 from hevopt.strategies import Strategy
 from hevopt.studies.case import Case, prepare
-from hevopt.studies.halves import SharedCount, halves, two_processors
+from hevopt.studies.halves import SharedCount, halves, nothing, two_processors
 from hevopt.studies.rows import Row, failed_row
 from hevopt.studies.settings import Settings
 from hevopt.studies.solved import run_case, why_not_causal
@@ -39,10 +39,12 @@ class Watch(NamedTuple):
 
     progress: what comes next, and how many cases of how many are done
     observe: every solved case, its row (no reference yet), plan and trajectory
+    meanwhile: called where this process would only wait for another, so that what comes after is there
     """
 
     progress: Progress = unseen
     observe: Observe = unobserved
+    meanwhile: Callable[[], None] = nothing
 
 
 NOBODY = Watch()
@@ -75,13 +77,14 @@ class Solving:
         short = len(self.cycle.time_s) <= _FORK_SAMPLES_MAX and 1 < len(cars) <= _FORK_CARS_MAX
         alone = self.others or self.watch.observe is not unobserved
         if may_fork and short and not alone and two_processors():
-            return halves(self._of_car, sorted(cars, key=self._work, reverse=True), self.tally)
+            order = sorted(cars, key=self._work, reverse=True)
+            return halves(self._of_car, order, self.tally, self.watch.meanwhile)
         return [self._of_car(n) for n in cars]
 
     def _work(self, n: int) -> tuple[bool, int]:
-        """What grows with the work on a car: whether its gear is free, and how many strategies are asked of it."""
+        """What grows with the work on a car: whether its gear is free, and its states times strategies."""
         car, wanted = self.asked[n]
-        return car.gear == "free", len(wanted)
+        return car.gear == "free", len(wanted) * sum(1 for _ in car.driveline.states())
 
     def _of_car(self, n: int) -> OfCar:
         car, wanted = self.asked[n]

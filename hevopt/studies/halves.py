@@ -46,13 +46,21 @@ def two_processors() -> bool:
     return len(os.sched_getaffinity(0)) > 1 if hasattr(os, "sched_getaffinity") else False
 
 
+def nothing() -> None:
+    """Nothing is to be done while this process waits."""
+
+
 def halves(
-    work: Callable[[int], _Result], order: Sequence[int], tally: SharedCount
+    work: Callable[[int], _Result],
+    order: Sequence[int],
+    tally: SharedCount,
+    meanwhile: Callable[[], None] = nothing,
 ) -> list[_Result]:
     """work(0) to work(count - 1), at most 256; a process forked from this one takes every call that is next when it
     is free.
 
     order: of the calls, those that take longest first, so that neither process waits long for the other
+    meanwhile: what this process does before it waits
     Results come back by number, whoever made them, and so does an error: the first that is raised on purpose. What
     the other process does not bring back, as where it was killed, is done here.
     """
@@ -71,6 +79,7 @@ def halves(
     there.close()
     try:
         found = _taken(work, tickets)
+        meanwhile()
         with suppress(EOFError, OSError, pickle.UnpicklingError):
             found |= here.recv()
         for n in range(count):

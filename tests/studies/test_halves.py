@@ -45,6 +45,38 @@ def test_results_come_back_in_order_from_both_processes() -> None:
     assert tally.total() == 12
 
 
+def test_first_process_does_what_comes_after_while_it_waits() -> None:
+    done: list[tuple[int, int]] = []
+
+    def meanwhile() -> None:
+        done.append((os.getpid(), tally.total()))
+
+    def work(n: int) -> None:
+        time.sleep(0.05 if os.getpid() == own else 0.5)
+        tally.add(1)
+
+    own, tally = os.getpid(), SharedCount()
+    halves(work, range(4), tally, meanwhile)
+
+    assert done == [(own, 3)]
+
+
+def test_cars_with_more_states_and_strategies_are_solved_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    orders: list[list[str]] = []
+    monkeypatch.setattr("hevopt.studies.by_car.two_processors", lambda: True)
+    monkeypatch.setattr(
+        "hevopt.studies.by_car.halves",
+        lambda work, order, *_: orders.append([cars[n].name for n in order]) or [],
+    )
+    cars = cars_of(("A", "B", "C1", "E"), Settings()).cars
+
+    compare_cars(cars, load_cycle("nedc"), Settings(), may_fork=True)
+
+    assert orders == [["E", "C1", "B", "A"]]
+
+
 def test_first_error_in_order_is_raised_whoever_met_it() -> None:
     def work(n: int) -> int:
         time.sleep(0.02)
