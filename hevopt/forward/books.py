@@ -15,6 +15,8 @@ from hevopt.display.facts import Shown
 from hevopt.forward import _breathing_kernels as gas
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
+from hevopt.forward.burning import breathed, burnt_kgps
+from hevopt.forward.converting import converting
 from hevopt.forward.lines import Line
 from hevopt.forward.slipping import slipping
 from hevopt.problem._battery_kernels import trace
@@ -106,7 +108,7 @@ def books_of(
     turns = record[:, col.PHASE] == motor.TURNING
     flows |= _burnt(car, flows, turns, None if breath is None else breath[:, gas.FUEL] / step_s)
     if breath is not None:
-        flows |= _breath(flows, breath)
+        flows |= breathed(flows, breath)
     spin = max(machine.spin_efficiency for machine in car.machines)
     flows["starter_electric_w"] = starter = np.maximum(flows["start_w"], 0.0) / spin
     electric = flows["machine_electric_w"] + flows["auxiliary_power_w"] + starter
@@ -142,10 +144,10 @@ def _driven(
     torque, given = record[:, col.ENGINE], machines_nm(record)
     turns = phase == motor.TURNING
     clutch = record[:, col.CLUTCH] * (n - units[-1])
-    fluid = record[:, col.IMPELLER] * n - record[:, col.TURBINE] * units[-1]
     cause = record[:, col.CAUSE].astype(int)
     speed = w * radius
     before = np.append(2 * speed[0] - record[0, col.SPEED], record[:-1, col.SPEED])
+    fluid = converting(record, before, n, units[-1], car.engine.idle_radps)
     flows = {
         "speed_mps": speed,
         "engine_torque_nm": np.where(turns, torque, 0.0),
@@ -156,7 +158,7 @@ def _driven(
         "machine_power_w": np.sum(given * units[1:-1], axis=0),
         "machine_inertia_w": np.sum(inertia[1:-1], axis=0),
         "clutch_torque_nm": record[:, col.CLUTCH],
-        "clutch_loss_w": clutch + fluid,
+        "clutch_loss_w": clutch + fluid["torque_converter_loss_w"],
         "brake_power_w": record[:, col.BRAKE] * w,
         "held_w": record[:, col.HELD] * w,
         "wheel_power_w": record[:, col.WHEEL] * w,
@@ -171,7 +173,7 @@ def _driven(
         flows[f"{machine}_torque_nm"] = given[unit]
         flows[f"{machine}_speed_radps"] = units[1 + unit]
     if car.driveline.converter is not None:
-        flows["torque_converter_loss_w"] = fluid
+        flows |= fluid
     for number, name in CAUSES.items():
         flows[f"clutch_{name}_w"] = np.where(cause == number, clutch, 0.0)
     return flows
@@ -235,18 +237,6 @@ def _off_gearbox(
     return loss.unknown(line.gears[way], speed, entering[:, None])[:, 0]
 
 
-def _breath(flows: Mapping[str, Array], breath: Array) -> dict[str, Array]:
-    """What the mean-value engine did beside burning. gas_lacking_nm: torque that it was to give and could not."""
-    lacking = flows["engine_torque_nm"] - breath[:, gas.GIVEN]
-    return {
-        "turbo_speed_radps": breath[:, gas.TURBO],
-        "boost_pa": breath[:, gas.BOOST],
-        "excess_air": breath[:, gas.EXCESS],
-        "engine_available_nm": breath[:, gas.AVAILABLE],
-        "gas_lacking_nm": np.where(flows["fuel_kgps"] > 0, lacking, 0.0),
-    }
-
-
 def _burnt(
     car: Architecture, flows: Mapping[str, Array], turns: Flags, own_kgps: Array | None
 ) -> dict[str, Array]:
@@ -256,13 +246,15 @@ def _burnt(
     idle = car.engine.idle_radps
     speed = np.where((speed < idle) & (speed > idle * (1 - _EDGE)), idle, speed)
     most = car.engine.covered_nm(np.where(turns, speed, idle))
-    unknown = np.isnan(car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)))
+    turning = np.where(turns, speed, 1.0)
+    unknown = np.isnan(car.engine.fuel_kgps(torque, turning))
     edge = np.where(unknown, _AHEAD, _EDGE)
     torque = np.where((torque > most) & (torque < most * (1 + edge)), most, torque)
-    fuel = np.where(turns, car.engine.fuel_kgps(torque, np.where(turns, speed, 1.0)), 0.0)
+    mapped, nox = burnt_kgps(car.engine, torque, turning)
+    fuel = np.where(turns, mapped, 0.0)
     by_map = {} if own_kgps is None else {"map_fuel_kgps": fuel}
     fuel = fuel if own_kgps is None else own_kgps
-    nox = np.where(fuel == 0, 0.0, car.engine.nox_kgps(torque, np.where(turns, speed, 1.0)))
+    nox = np.where(fuel == 0, 0.0, nox)
     power = fuel * car.engine.heating_value_jpkg
     loss = np.zeros(len(torque))
     for (name, _), machine in zip(car.driveline.machines, car.machines, strict=True):

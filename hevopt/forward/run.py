@@ -277,9 +277,9 @@ def check_step(step_s: float, handling: Handling) -> None:
 
 def check_charge(car: Architecture, books: Books, record: Array, time_s: Array) -> None:
     """DataError where the battery is empty, or its power too little; record: of the loop; time_s: (step + 1,)."""
+    # Outside a measured map no energy is known either, and that is told with the run; the loop's own has no end.
     beyond = ~np.isfinite(books.energy_j) & ~books.off_map.any()
-    # Outside a measured map no energy is known either, and that is told with the run.
-    beyond[1:] |= np.diff(~np.isfinite(record[:, col.ENERGY]), prepend=False) & ~books.off_map
+    beyond[1:] |= ~np.isfinite(record[:, col.ENERGY])
     lost = beyond | (books.energy_j < 0)
     if lost.any():
         first = int(np.argmax(lost))

@@ -27,8 +27,9 @@ from hevopt.studies.settings import Settings
 from hevopt.studies.solved import check_horizon, run_case
 from hevopt.units import litres_per_100km
 
-# Kinds of a cycle's steps, the first that fits.
+# Kinds of a cycle's steps, the first that fits; and what a way counts that is shorter or longer than the trace's.
 KINDS = ("standing", "launch", "change", "braking", "driving")
+WAY = "distance"
 _MOVES_MPS = 0.1
 
 
@@ -54,7 +55,8 @@ class DrivenPlan(Shown):
     bound_l_per_100km: least of fuel and weighted NOx of any plan that follows the cycle to the same end charge; a
     car that is driven may fall below it, as it does not follow exactly, and its engine gives its momentum back
     electricity_kwh_per_100km: stored energy that the way driven took from the battery
-    difference_percent: kind of step -> forward less backward, charge-corrected, as a share of backward's
+    difference_percent: kind of step -> forward less backward, charge-corrected, as a share of backward's; and what
+    the way driven counts beside the trace's, as figures are per distance: the sum is change_percent
     Without an engine there is neither corrected fuel nor its bound, and what differs is the stored energy taken.
     marks: what is to be known of the run beside its figures
     asked: how the strategy was asked on the way; None where its plan was replayed
@@ -212,7 +214,7 @@ def _marks(case: Case, run: ForwardRun, surplus_j: float) -> tuple[str, ...]:
 
 
 def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> dict[str, float]:
-    """Charge-corrected fuel, forward less backward, by kind of step, in per cent of the backward one's.
+    """Charge-corrected fuel, forward less backward, by kind of step and way, in per cent of the backward one's.
 
     price_kgpj: what a joule taken from the battery counts; anything without an engine, where nothing else does
     """
@@ -220,10 +222,12 @@ def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> d
     times = np.append(table.time_s, table.time_s[-1] + table.step_s[-1])
 
     def per_step(rate: Array) -> Array:
-        summed = np.append(0.0, np.cumsum(np.nan_to_num(rate))) * run.step_s
+        summed = np.append(0.0, np.cumsum(rate)) * run.step_s
         return np.diff(np.interp(times, run.time_s, summed))
 
-    forward = per_step(books["fuel_kgps"] + price_kgpj * books["battery_chemical_w"])
+    # Fuel that no map knows counts as little here as in the whole.
+    burnt = np.nan_to_num(books["fuel_kgps"])
+    forward = per_step(burnt + price_kgpj * np.nan_to_num(books["battery_chemical_w"]))
     starts = np.diff((run.engine == motor.STARTING).astype(float), prepend=0.0) > 0
     forward += per_step(starts / run.step_s) * run.car.engine.start_fuel_kg
     drained_j = flows["battery_chemical_w"] * table.step_s + trajectory.switch_energy_j
@@ -232,7 +236,9 @@ def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> d
     asked_j = trajectory.energy_j[0] if run.car.electric else trajectory.problem.end_min_j
     total = trajectory.total_fuel_kg - price_kgpj * (trajectory.end_j - asked_j)
     gap = 100 * (forward - backward) / total if total > 0 else forward * np.nan
-    return {kind: float(np.sum(gap[kinds == n])) for n, kind in enumerate(KINDS)}
+    found = {kind: float(np.sum(gap[kinds == n])) for n, kind in enumerate(KINDS)}
+    per_way = run.cycle.distance_m / run.distance_m
+    return found | {WAY: (100 + float(np.sum(gap))) * (per_way - 1)}
 
 
 def kinds_of(trajectory: Trajectory, run: ForwardRun, times: Array) -> Array:
@@ -250,7 +256,9 @@ def kinds_of(trajectory: Trajectory, run: ForwardRun, times: Array) -> Array:
     moving = books["speed_mps"] > 0
     tests = (
         signals.speed_mps == 0,
-        anywhere(np.abs(books["clutch_launch_w"]) > 0),
+        anywhere(
+            np.abs(books["clutch_launch_w"]) + books.get("torque_converter_launch_w", 0.0) > 0
+        ),
         anywhere(changes & moving),
         signals.wheel_power_w < 0,
         np.ones(len(signals.speed_mps), dtype=bool),

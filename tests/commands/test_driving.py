@@ -27,7 +27,7 @@ def test_as_json_the_audit_adds_up(hevopt):
     assert told["marks"] == [] and told["backward"]["architecture"] == "D"
     assert told["quality"]["violations"] == [] and told["handling"]["shifting"]["gap_s"] == 0.5
     assert sum(told["difference_percent"].values()) == pytest.approx(
-        told["change_percent"], abs=0.1
+        told["change_percent"], abs=1e-6
     )
 
 

@@ -51,7 +51,7 @@ def test_a_strategy_that_decides_on_the_way_drives_like_its_backward_twin(urban,
     # A rule calibrated for a whole cycle may leave its charge in the loop; then the run is marked.
     assert abs(found.charge_error) < 0.01 or any("end charge" in str(m) for m in found.marks)
     assert 0 < run.starts <= 2 * found.backward.engine_starts + 2
-    assert sum(found.difference_percent.values()) == pytest.approx(found.change_percent, abs=0.2)
+    assert sum(found.difference_percent.values()) == pytest.approx(found.change_percent, abs=1e-6)
 
 
 def test_what_it_decides_follows_from_what_is_stored(urban):
