@@ -8,6 +8,7 @@ rest. Gears and clutch are the driver's, as in a replayed plan.
 """
 
 import ctypes
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -35,7 +36,7 @@ from hevopt.forward.run import (
     whole_handling,
 )
 from hevopt.powertrain.points import OperatingPoints
-from hevopt.problem.arrays import Array, Flags, Indices
+from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import soc
 from hevopt.problem.holding import turning_modes
 from hevopt.problem.problem import Problem, Trajectory
@@ -71,7 +72,7 @@ class Decision(NamedTuple):
     """
 
     engine_on: bool
-    machines_nm: tuple[float, ...]
+    machines_nm: Sequence[float]
     engine_radps: float
     engine_nm: float
     listed: int
@@ -100,12 +101,12 @@ class Decider:
         flows, columns = flows_of(table)
         self._states = flows.states(columns)
         wanted = [f"{name}_torque_nm" for name in flows.machines]
-        self._machines_nm = np.array([flows[name][:, columns] for name in wanted])
-        self._engine = np.zeros((2, *self._machines_nm.shape[1:]))
+        self._machines = len(wanted)
         line = flows.car.driveline
         if line.free_engine_speed or line.converter is not None:
-            for n, name in enumerate(("engine_speed_radps", "engine_torque_nm")):
-                self._engine[n] = flows[name][:, columns]
+            wanted += ["engine_speed_radps", "engine_torque_nm"]
+        # (row, control, flow)
+        self._wanted = np.stack([flows[name][:, columns] for name in wanted], axis=-1)
         self._turning = turning_modes(problem)
         on = np.array([state.engine_on for state in self._states])
         self._keeps: list[Flags] = [
@@ -130,17 +131,10 @@ class Decider:
         self._mode, state = int(self.problem.table.mode[control]), self._states[control]
         if state.engine_on != turns:
             self._since_s = at_s
-        machines_nm = tuple(self._machines_nm[:, row, control].tolist())
-        radps, engine_nm = self._engine[:, row, control].tolist()
-        return Decision(
-            state.engine_on,
-            machines_nm,
-            radps,
-            engine_nm,
-            state.listed,
-            state.gears,
-            bool(state.closed),
-        )
+        wanted: list[float] = self._wanted[row, control].tolist()
+        machines_nm, engine = wanted[: self._machines], wanted[self._machines :] or (0.0, 0.0)
+        closed = bool(state.closed)
+        return Decision(state.engine_on, machines_nm, *engine, state.listed, state.gears, closed)
 
 
 def follow_asked(
@@ -193,6 +187,7 @@ class _Orders:
         self._car = car
         self._decider, self._way, self._order = decider, cache(line.index), line.order
         self._gears, self._step, task = _undecided(car, cycle, from_s, planned)
+        self._slips = car.driveline.converter is not None
         self._asked = Asked(self._answer)  # kept, as the loop knows nothing but where it is
         address = ctypes.cast(self._asked, ctypes.c_void_p).value
         assert address is not None  # of a function that is there
@@ -204,11 +199,11 @@ class _Orders:
         """The task's step d filled with what is decided."""
         decider, task, course = self._decider, self.task, self.course
         # A step of the driven car may begin a little before the cycle's.
-        k = int(self._step[d]) if decider.points is not None else min(d, len(self._gears) - 1)
-        gear = int(self._gears[k])
+        k = self._step[d] if decider.points is not None else min(d, len(self._gears) - 1)
+        gear = self._gears[k]
         command = decider.decide(float(task.from_s[d]), k, gear, look, energy_j)
         task.way[d] = self._way(command.listed or gear, command.gears)
-        if d > 0 and _coasts(self._car, command, look):
+        if self._slips and d > 0 and _coasts(self._car, command, look):
             task.way[d], task.apart[d] = task.way[d - 1], 3
         task.engine_on[d] = command.engine_on
         torques = [command.machines_nm[machine] for machine in self._order]
@@ -240,7 +235,7 @@ def _coasts(car: Architecture, command: Decision, look: col.Look) -> bool:
 
 def _undecided(
     car: Architecture, cycle: Cycle, from_s: Array, planned: Trajectory
-) -> tuple[Indices, Indices, LoopTask]:
+) -> tuple[list[int], list[int], LoopTask]:
     """The driver's gear at each step of the cycle, the step of each decision, and the task before any of them."""
     table, count = planned.problem.table, len(from_s) - 1
     gears, open_while = driver_gears(signals_of(table))
@@ -249,4 +244,4 @@ def _undecided(
         np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool), open_while[step], np.zeros(count),
         np.full(count + 1, float(planned.energy_j[0])), np.zeros((count, len(car.machines) - 1)),
     )  # fmt: skip
-    return gears, step, task_of(car, cycle, plan, from_s)
+    return gears.tolist(), step.tolist(), task_of(car, cycle, plan, from_s)

@@ -1,15 +1,17 @@
 """A car's limits over speed, tabulated from its components for the loop."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.converter import Converter
 from hevopt.car.machine import Machine
 from hevopt.forward._beside_kernels import Beside
 from hevopt.forward._limits_kernels import Limits, Motors
 from hevopt.problem.arrays import Array
-from hevopt.problem.battery import power_limits_w
+from hevopt.problem.battery import Battery, power_limits_w
 
 _ENGINE_STEP_RADPS = 0.25
 _MACHINE_POINTS = 1201
@@ -20,6 +22,10 @@ _LOADS = 33
 _BEYOND = 1.2
 # Steps of a table of the braking that a machine may take: speed, and braking force over weight.
 _BRAKING_MPS, _BRAKING_RATE = 0.25, 0.01
+# Speeds at a time for which torques that battery and machine allow are searched: what memory close by holds.
+_ROWS = 32
+# Machines of which the tables are kept, for cars that differ in something else.
+_KEPT = 8
 # Machines without a limit of their own are tabulated up to these.
 _FASTEST_RADPS, _STRONGEST_NM = 2e4, 1e4
 
@@ -47,7 +53,7 @@ def limits_of(
         )
         load = np.nan_to_num(np.array(list(given)))
     machine_speed, most, loss = _tabulated(machine)
-    low, high = _allowed(car, machine, machine_speed, (least_w, most_w))
+    low, high = _allowed(machine, car.battery, car.converter, (least_w, most_w))
     return Limits(
         _ENGINE_STEP_RADPS, full, least, load, float(least_w), float(most_w - least_w) / max(rows - 1, 1),
         float(machine_speed[1]), low, high, loss, most, engine.idle_radps, engine.speed_max_radps, own_w,
@@ -71,7 +77,8 @@ def beside_of(
     for n, machine in enumerate(car.machines[other] for other in others):
         speed, found.most_nm[n], found.loss_w[n] = _tabulated(machine)
         found.step_radps[n] = speed[1]
-        found.low_nm[n], found.high_nm[n] = _allowed(car, machine, speed, loads_w or (own_w, own_w))
+        allowed = _allowed(machine, car.battery, car.converter, loads_w or (own_w, own_w))
+        found.low_nm[n], found.high_nm[n] = allowed
     return found
 
 
@@ -91,6 +98,7 @@ def motors_of(car: Architecture) -> Motors:
     )  # fmt: skip
 
 
+@lru_cache(maxsize=_KEPT)
 def _tabulated(machine: Machine) -> tuple[Array, float, Array]:
     """Speeds, highest torque, and (speed, torque) loss of a machine up to that torque of either sign."""
     top = min(machine.speed_max_radps, _FASTEST_RADPS)
@@ -120,20 +128,28 @@ def _braking_share(car: Architecture) -> Array:
     return np.ascontiguousarray(braking.share(speed[:, None], rate[None, :]), dtype=np.float64)
 
 
+@lru_cache(maxsize=_KEPT)
 def _allowed(
-    car: Architecture, machine: Machine, speed: Array, loads_w: tuple[float, float]
+    machine: Machine, battery: Battery, converter: Converter | None, loads_w: tuple[float, float]
 ) -> tuple[Array, Array]:
     """(speed,) lowest and highest torque that machine and battery allow at any of the loads."""
+    speed, _, _ = _tabulated(machine)
     limit = np.minimum(machine.limit_nm(speed), _STRONGEST_NM)
     limit = np.where(speed <= machine.speed_max_radps, limit, 0.0)
     share = np.linspace(-1.0, 1.0, 2 * _TORQUES + 1)
-    torque = limit[:, None] * share
-    loss = np.nan_to_num(machine.loss_w(torque, speed[:, None]), nan=np.inf)
-    drawn = torque * speed[:, None] + loss
-    power = car.terminal_w(drawn + loads_w[1])
-    least, greatest = power_limits_w(car.battery)
-    inside = (car.terminal_w(drawn + loads_w[0]) >= least) & (power <= greatest) | (share == 0)
-    high = np.max(np.where(inside, torque, 0.0), axis=1)
-    # Beyond the torque of least electric power more braking charges less.
-    best = np.argmin(np.where(inside, power, np.inf), axis=1)
-    return np.minimum(torque[np.arange(len(speed)), best], 0.0), high
+    least, greatest = power_limits_w(battery)
+    low, high = np.zeros(len(speed)), np.zeros(len(speed))
+    for first in range(0, len(speed), _ROWS):
+        rows = slice(first, first + _ROWS)
+        torque = limit[rows, None] * share
+        drawn = np.nan_to_num(machine.loss_w(torque, speed[rows, None]), nan=np.inf)
+        drawn += torque * speed[rows, None]
+        gentle, power = (drawn + load_w for load_w in loads_w)
+        if converter is not None:
+            gentle, power = converter.terminal_w(gentle), converter.terminal_w(power)
+        inside = (gentle >= least) & (power <= greatest) | (share == 0)
+        high[rows] = np.max(np.where(inside, torque, 0.0), axis=1)
+        # Beyond the torque of least electric power more braking charges less.
+        best = np.argmin(np.where(inside, power, np.inf), axis=1)
+        low[rows] = np.minimum(torque[np.arange(len(torque)), best], 0.0)
+    return low, high

@@ -43,7 +43,7 @@ class PowerFlows(Flows):
         for branch in self.branches:
             width = len(branch.labels)
             for piece in branch.pieces:
-                step, values = piece.here.shafts.step, self._of(piece.here, piece.given)[name]
+                step, values = piece.here.shafts.step, self._one(piece.here, piece.given, name)
                 if piece.slot is None:
                     whole[step, first : first + width] = values
                 else:
@@ -120,6 +120,17 @@ class PowerFlows(Flows):
                     taken = np.zeros(len(state), dtype=np.int64)
                 if len(state):
                     yield piece, state, taken
+
+    def _one(self, here: Setting, given: Mapping[str, Array], name: str) -> Array:
+        """The flow of a name among those of `_of`; of torques and the engine's speed nothing else is worked out."""
+        if name == "engine_speed_radps":
+            return here.engine_radps[:, None]
+        turns = {f"{actuator}_torque_nm": actuator for actuator in (ENGINE, *self.machines)}
+        actuator = turns.get(name)
+        if actuator is None:
+            return self._of(here, given)[name]
+        torques = given if actuator in given else completed(here, given)
+        return torques.get(actuator, np.zeros((1, 1)))
 
     def _of(self, here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
         """name -> flows of (state, level) torques given, some (state, 1)."""

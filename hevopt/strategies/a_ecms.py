@@ -75,7 +75,8 @@ class AdaptiveFactor:
     ) -> None:
         choices = choices_of(problem)
         require_choices(problem, choices, "a_ecms")
-        drain_j = drain_at_j(problem, choices, problem.start_j)
+        looks_back = settings.window_s < np.inf
+        drain_j = drain_at_j(problem, choices, problem.start_j) if looks_back else np.zeros(0)
         settings = settings._replace(
             base_kgpj=settings.base_kgpj / problem.battery.coulombic_efficiency
         )

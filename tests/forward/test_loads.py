@@ -8,6 +8,7 @@ from forward.drives import STRATEGY, constant, follow, ramp
 
 from hevopt import build_problem, drive, load_architecture, performance
 from hevopt.car.handling import DriverGains, Handling
+from hevopt.forward.limits import limits_of
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of
 from hevopt.output.driven_tables import audit
@@ -102,3 +103,13 @@ def test_full_pedal_takes_what_the_converter_loses_as_well():
     behind = performance(load_architecture("electric_compact", {"converter.efficiency": 0.9}))
     assert behind.to_speed_s[60] == pytest.approx(plain.to_speed_s[60], rel=1e-3)
     assert behind.to_100_j == pytest.approx(plain.to_100_j / 0.9, rel=0.02)
+
+
+def test_cars_of_another_mass_share_the_tables_of_machine_and_battery():
+    car = load_architecture("C2")
+    one, other = limits_of(car), limits_of(car.of_mass(1500.0))
+    assert one.loss_w is other.loss_w and one.high_nm is other.high_nm
+    loaded = limits_of(car, (0.0, 5e3))
+    assert loaded.high_nm is not one.high_nm and (loaded.high_nm <= one.high_nm).all()
+    weaker = replace(car, battery=replace(car.battery, power_max_discharge_w=5e3))
+    assert (limits_of(weaker).high_nm[400:800] < one.high_nm[400:800]).all()

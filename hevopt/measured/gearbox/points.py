@@ -52,7 +52,6 @@ _QUANTITIES = {
     "efficiency": ("fraction",),
     "loss": ("torque", "power"),
 }
-_GEARS_MAX = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
