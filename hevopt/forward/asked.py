@@ -132,9 +132,10 @@ class Decider:
         if state.engine_on != turns:
             self._since_s = at_s
         wanted: list[float] = self._wanted[row, control].tolist()
-        machines_nm, engine = wanted[: self._machines], wanted[self._machines :] or (0.0, 0.0)
-        closed = bool(state.closed)
-        return Decision(state.engine_on, machines_nm, *engine, state.listed, state.gears, closed)
+        machines_nm, engine = wanted[: self._machines], wanted[self._machines :]
+        radps, engine_nm = engine or (0.0, 0.0)
+        closed, gears = bool(state.closed), state.gears
+        return Decision(state.engine_on, machines_nm, radps, engine_nm, state.listed, gears, closed)
 
 
 def follow_asked(
