@@ -27,10 +27,10 @@ def random_battery(rng: np.random.Generator, curved: bool) -> Battery:
     )
 
 
-def random_problem(seed: int) -> Problem:
-    """At most 6 steps, 4 controls, 3 modes; random switching, some forbidden; every second battery curved."""
+def random_problem(seed: int, most: int = 4) -> Problem:
+    """At most 6 steps, 3 modes, `most` controls; random switching, some forbidden; every second battery curved."""
     rng = np.random.default_rng(seed)
-    steps, controls, modes = rng.integers(2, 7), rng.integers(2, 5), rng.integers(1, 4)
+    steps, controls, modes = rng.integers(2, 7), rng.integers(2, most + 1), rng.integers(1, 4)
     power = rng.uniform(-1500, 1500, (steps, controls))
     fuel = np.maximum(0.2 - 1e-4 * power + rng.uniform(-0.05, 0.05, power.shape), 0.0) * 1e-3
     mode = np.sort(rng.integers(0, modes, controls))

@@ -121,6 +121,22 @@ def kept(choices: Choices, mask: Flags) -> Choices:
     )
 
 
+def by_power(choices: Choices) -> Choices:
+    """The choices by rising battery power within each block; those that are so already as they are."""
+    block = np.repeat(
+        np.arange(choices.steps * choices.modes), np.diff(choices.first, axis=1).ravel()
+    )
+    falls = (np.diff(choices.power_w) < 0.0) & (np.diff(block) == 0)
+    if not falls.any():
+        return choices
+    order = np.lexsort((choices.power_w, block))
+    return choices._replace(
+        control=choices.control[order],
+        cost_kg=choices.cost_kg[order],
+        power_w=choices.power_w[order],
+    )
+
+
 def without_dominated(choices: Choices) -> Choices:
     """The choices that no other of the same step and mode beats in both cost and battery power.
 

@@ -7,23 +7,17 @@ import numpy as np
 from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays, chemical_power, state_at
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices
+from hevopt.problem.choices import Choices, by_power
 from hevopt.problem.switching import Switching
+from hevopt.strategies._contending_kernels import Penalty, Room, contenders, rises_of, room_for
 from hevopt.strategies._rollout_kernels import Grid
 
-# Divisions of the grid between which a move over curved battery characteristics is taken as linear.
-_PIECES = 24
+# Divisions of a whole battery's energy between which a move over its curves is taken as linear, and the fewest and
+# the most nodes of a grid that are one.
+_DIVISIONS, _NODES_LEAST, _NODES_MOST = 40, 40, 128
 
 
-class Penalty(NamedTuple):
-    """What takes the place of infinity: per cell below a grid and above it, and where no path is known."""
-
-    floor_kg: float
-    ceiling_kg: float
-    unreachable_kg: float
-
-
-@compiled()
+@compiled(bare=True)
 def _relax(
     best: Array,
     value: Array,
@@ -43,7 +37,7 @@ def _relax(
         here[j] = min(here[j], candidate)
 
 
-@compiled()
+@compiled(bare=True)
 def _line(best: Array, low: int, high: int, start: float, slope: float) -> None:
     """best[j] = min(best[j], start + slope (j - low)) for low <= j < high."""
     here = best[low:high]
@@ -51,14 +45,14 @@ def _line(best: Array, low: int, high: int, start: float, slope: float) -> None:
         here[j] = min(here[j], start + slope * np.int32(j))
 
 
-@compiled()
+@compiled(bare=True)
 def _lower(best: Array, other: Array, extra: float) -> None:
     """best[j] = min(best[j], other[j] + extra)."""
     for j in range(len(best)):
         best[j] = min(best[j], other[j] + extra)
 
 
-@compiled()
+@compiled(bare=True)
 def _shift(
     best: Array,
     value: Array,
@@ -107,20 +101,28 @@ def _shift(
         j = run
 
 
-@compiled()
-def _moves(
-    power: Array,
-    state: Array,
-    efficiency: float,
-    scale: float,
-    drift: float,
-    moved: Array,
-) -> None:
-    """(entry,) cells that each of some powers moves a node of a battery's state by, several of them at a time."""
-    voltage, discharge, charging = state[0], state[1], state[2]
+class _Moving(NamedTuple):
+    """What a step does to the nodes of a grid.
+
+    breaks: (division + 1,) nodes between which a move is taken as linear
+    states: (division + 1, 3) open-circuit voltage and resistances there
+    scale, drift: cells per chemical power, and those that the next grid lies lower by
+    """
+
+    breaks: Indices
+    states: Array
+    efficiency: float
+    scale: float
+    drift: float
+
+
+@compiled(bare=True)
+def _moves(power: Array, moving: _Moving, b: int, moved: Array) -> None:
+    """(entry,) cells that each of some powers moves a node by, several of them at a time."""
+    voltage, discharge, charging = moving.states[b, 0], moving.states[b, 1], moving.states[b, 2]
     for i in range(len(power)):
-        moved[i] = drift + scale * chemical_power(
-            power[i], voltage, discharge, charging, efficiency
+        moved[i] = moving.drift + moving.scale * chemical_power(
+            power[i], voltage, discharge, charging, moving.efficiency
         )
 
 
@@ -128,22 +130,20 @@ def _moves(
 def _bends(
     grid_low: float, cell: float, nodes: int, battery: BatteryArrays
 ) -> tuple[Indices, Array]:
-    """Nodes between which a move is taken as linear, and voltage and resistances there.
-
-    The ends, where voltage is linear in SOC and resistance constant; else also _PIECES even divisions.
-    """
-    constant = np.ptp(battery.discharge_ohm) == 0.0 and np.ptp(battery.charge_ohm) == 0.0
-    pieces = 1 if constant and len(battery.soc) == 2 else min(_PIECES, nodes - 1)
-    breaks = np.empty(pieces + 1, dtype=np.int64)
-    states = np.empty((pieces + 1, 3))
-    for b in range(pieces + 1):
-        breaks[b] = b * (nodes - 1) // pieces
+    """Nodes between which a move is taken as linear, the ends among them; voltage and resistances there."""
+    share = cell * (nodes - 1) / (battery.energy_j[-1] - battery.energy_j[0])
+    fine = min(int(np.ceil(_DIVISIONS * share)), nodes // _NODES_LEAST)
+    divisions = max(fine, nodes // _NODES_MOST, 1)
+    breaks = np.empty(divisions + 1, dtype=np.int64)
+    states = np.empty((divisions + 1, 3))
+    for b in range(divisions + 1):
+        breaks[b] = b * (nodes - 1) // divisions
         _, voltage, discharge, charging = state_at(grid_low + cell * breaks[b], battery)
         states[b, 0], states[b, 1], states[b, 2] = voltage, discharge, charging
     return breaks, states
 
 
-@compiled()
+@compiled(bare=True)
 def _switch_back(
     value: Array,
     least: Array,
@@ -183,11 +183,38 @@ def backward(
     terminal: (mode, node) cost-to-go after the last step
     between_j: (time,) bottom of the grid between switching and step; that of `grid` where switching takes none
     """
+    choices = by_power(choices)
     # NumPy asks for large pages of memory, compiled loops do not; small ones would take a third of the time.
     value = np.empty((choices.steps + 1, *terminal.shape))
     value[-1] = terminal
     _fill_back(choices, value, grid, between_j, penalty, battery)
     return value
+
+
+@compiled(bare=True)
+def _step_back(
+    best: Array,
+    value: Array,
+    cost: Array,
+    power: Array,
+    moving: _Moving,
+    penalty: Penalty,
+    room: Room,
+) -> None:
+    """Lower the best (node,) of a step to that of its choices, (entry,) by rising power; value: after it."""
+    breaks, nodes, entries = moving.breaks, len(value), len(cost)
+    rises_of(value, room)
+    _moves(power, moving, 0, room.moved[0, :entries])
+    for b in range(len(breaks) - 1):
+        low, high = breaks[b], breaks[b + 1]
+        start, after = room.moved[b % 2, :entries], room.moved[(b + 1) % 2, :entries]
+        _moves(power, moving, b + 1, after)
+        first, last = contenders(cost, start, after, (low, high), nodes, penalty, room)
+        end = high + 1 if b == len(breaks) - 2 else high
+        for c in range(first, last):
+            i = room.kept[c]
+            slope = (after[i] - start[i]) / (high - low)
+            _shift(best, value, cost[i], low, end, start[i], slope, penalty)
 
 
 @compiled()
@@ -207,24 +234,23 @@ def _fill_back(
     """
     first, grid_low, cell = choices.first, grid.low_j, grid.cell_j
     steps, modes, nodes = first.shape[0], value.shape[1], value.shape[2]
-    least, moved = np.empty((modes, nodes)), np.empty((2, (first[:, -1] - first[:, 0]).max()))
-    efficiency = battery.coulombic_efficiency
+    least = np.empty((modes, nodes))
+    room = room_for(nodes, (first[:, -1] - first[:, 0]).max())
     for k in range(steps - 1, -1, -1):
         breaks, states = _bends(between_j[k], cell, nodes, battery)
-        drift = (between_j[k] - grid_low[k + 1]) / cell
-        scale = -choices.step_s[k] / cell
+        moving = _Moving(
+            breaks,
+            states,
+            battery.coulombic_efficiency,
+            -choices.step_s[k] / cell,
+            (between_j[k] - grid_low[k + 1]) / cell,
+        )
         for n in range(modes):
             least[n] = penalty.unreachable_kg
             begin, end = first[k, n], first[k, n + 1]
-            power, cost = choices.power_w[begin:end], choices.cost_kg[begin:end]
-            _moves(power, states[0], efficiency, scale, drift, moved[0])
-            for b in range(len(breaks) - 1):
-                low, high = breaks[b], breaks[b + 1]
-                start, after = moved[b % 2], moved[(b + 1) % 2]
-                _moves(power, states[b + 1], efficiency, scale, drift, after)
-                last = high + 1 if b == len(breaks) - 2 else high
-                for i in range(end - begin):
-                    slope = (after[i] - start[i]) / (high - low)
-                    _shift(least[n], value[k + 1, n], cost[i], low, last, start[i], slope, penalty)
+            _step_back(
+                least[n], value[k + 1, n], choices.cost_kg[begin:end], choices.power_w[begin:end],
+                moving, penalty, room,
+            )  # fmt: skip
         apart = (grid_low[k] - between_j[k]) / cell
         _switch_back(value[k], least, choices.switching, k, apart, cell, penalty)

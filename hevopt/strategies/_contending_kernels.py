@@ -1,0 +1,130 @@
+"""Compiled choice of those that may be the best somewhere: of many at a step, few are, whatever comes after it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hevopt._compile import compiled
+from hevopt.problem.arrays import Array, Indices
+
+# Cells whose least and greatest rises are kept as one.
+_CELLS = 16
+
+
+class Penalty(NamedTuple):
+    """What takes the place of infinity: per cell below a grid and above it, and where no path is known."""
+
+    floor_kg: float
+    ceiling_kg: float
+    unreachable_kg: float
+
+
+class Room(NamedTuple):
+    """Where a step's work is written, made once.
+
+    least, greatest: (block,) rises per cell of the cost-to-go
+    moved: (2, entry) cells that either end of some nodes moves by
+    kept: (entry,) those that may be the best there
+    """
+
+    least: Array
+    greatest: Array
+    moved: Array
+    kept: Indices
+
+
+@compiled()
+def room_for(nodes: int, entries: int) -> Room:
+    """Room for a grid of some nodes and so many choices a step."""
+    blocks = (nodes - 2) // _CELLS + 1
+    moved, kept = np.empty((2, entries)), np.empty(entries, dtype=np.int64)
+    return Room(np.empty(blocks), np.empty(blocks), moved, kept)
+
+
+@compiled(bare=True)
+def rises_of(value: Array, room: Room) -> None:
+    """Fill the least and the greatest rise per cell of a cost-to-go (node,) over every _CELLS cells."""
+    for block in range(len(room.least)):
+        low, high = np.inf, -np.inf
+        for c in range(block * _CELLS, min((block + 1) * _CELLS, len(value) - 1)):
+            rise = value[c + 1] - value[c]
+            low, high = min(low, rise), max(high, rise)
+        room.least[block], room.greatest[block] = low, high
+
+
+@compiled(bare=True)
+def _extreme(
+    sign: float, rises: Array, below: float, above: float, nodes: int, penalty: Penalty
+) -> float:
+    """The greatest (sign 1) or the least (sign -1) rise per cell between two nodes, beyond the grid too."""
+    blocks = len(rises)
+    begin = max(min(int(below) // _CELLS, blocks - 1), 0)
+    end = max(min(int(above) // _CELLS, blocks - 1), 0)
+    found = sign * rises[begin]
+    for block in range(begin + 1, end + 1):
+        found = max(found, sign * rises[block])
+    if below < 0.0:
+        found = max(found, -sign * penalty.floor_kg)
+    if above > nodes - 1:
+        found = max(found, sign * penalty.ceiling_kg)
+    return sign * found
+
+
+@compiled(bare=True)
+def _beaten(one: int, other: int, rise: float, cost: Array, start: Array, after: Array) -> bool:
+    """Whether an entry costs no less than another at both ends of some nodes, where a cell higher costs `rise`."""
+    more = cost[one] - cost[other]
+    return (
+        more + rise * (start[one] - start[other]) >= 0.0
+        and more + rise * (after[one] - after[other]) >= 0.0
+    )
+
+
+@compiled(bare=True)
+def contenders(
+    cost: Array,
+    start: Array,
+    after: Array,
+    ends: tuple[int, int],
+    nodes: int,
+    penalty: Penalty,
+    room: Room,
+) -> tuple[int, int]:
+    """Keep the entries, whose moves fall from one to the next, that may be the best at some node: from and to.
+
+    start, after: (entry,) cells that each moves the first and the last of the nodes, `ends`, by
+
+    Of two, the one that moves lower finds a cost-to-go that is lower by at most the cells between them times the
+    greatest rise between where they lead, and higher by at most minus the least rise times that. One that costs
+    more than that more than the other is the best nowhere: what holds at both ends of the nodes holds
+    between them, where moves are linear. Beyond the grid, rises are those of the penalty. What no battery gives
+    (NaN) is kept, and beats nothing.
+    """
+    low, high = ends
+    kept = room.kept
+    count, other = 0, -1
+    for i in range(len(cost)):
+        possible = np.isfinite(start[i] + after[i])
+        if possible and other >= 0:
+            bottom = min(low + start[i], high + after[i])
+            top = max(low + start[other], high + after[other])
+            rise = _extreme(1.0, room.greatest, bottom, top, nodes, penalty)
+            if _beaten(i, other, rise, cost, start, after):
+                continue
+        kept[count] = i
+        count += 1
+        other = i if possible else other
+    first, other = count, -1
+    for c in range(count - 1, -1, -1):
+        i = kept[c]
+        possible = np.isfinite(start[i] + after[i])
+        if possible and other >= 0:
+            bottom = min(low + start[other], high + after[other])
+            top = max(low + start[i], high + after[i])
+            rise = _extreme(-1.0, room.least, bottom, top, nodes, penalty)
+            if _beaten(i, other, rise, cost, start, after):
+                continue
+        first -= 1
+        kept[first] = i
+        other = i if possible else other
+    return first, count
