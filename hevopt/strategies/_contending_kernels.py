@@ -60,7 +60,7 @@ def _extreme(
     blocks = len(rises)
     begin = max(min(int(below) // _CELLS, blocks - 1), 0)
     end = max(min(int(above) // _CELLS, blocks - 1), 0)
-    found = sign * rises[begin]
+    found: float = sign * rises[begin]
     for block in range(begin + 1, end + 1):
         found = max(found, sign * rises[block])
     if below < 0.0:
@@ -73,11 +73,10 @@ def _extreme(
 @compiled(bare=True)
 def _beaten(one: int, other: int, rise: float, cost: Array, start: Array, after: Array) -> bool:
     """Whether an entry costs no less than another at both ends of some nodes, where a cell higher costs `rise`."""
-    more = cost[one] - cost[other]
-    return (
-        more + rise * (start[one] - start[other]) >= 0.0
-        and more + rise * (after[one] - after[other]) >= 0.0
-    )
+    more: float = cost[one] - cost[other]
+    first: float = more + rise * (start[one] - start[other])
+    last: float = more + rise * (after[one] - after[other])
+    return first >= 0.0 and last >= 0.0
 
 
 @compiled(bare=True)

@@ -31,7 +31,8 @@ from hevopt.problem.choices import Choices, choices_of, without_dominated
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import simulate, total_cost_kg
 from hevopt.problem.switching import switched
-from hevopt.strategies._backward_kernels import Penalty, backward
+from hevopt.strategies._backward_kernels import backward
+from hevopt.strategies._contending_kernels import Penalty
 from hevopt.strategies._reach_kernels import Reach
 from hevopt.strategies._rollout import follow, reach_of
 from hevopt.strategies._rollout_kernels import Grid
