@@ -203,7 +203,8 @@ def _step_back(
 ) -> None:
     """Lower the best (node,) of a step to that of its choices, (entry,) by rising power; value: after it."""
     breaks, nodes, entries = moving.breaks, len(value), len(cost)
-    rises_of(value, room)
+    if entries > 1:
+        rises_of(value, room)
     _moves(power, moving, 0, room.moved[0, :entries])
     for b in range(len(breaks) - 1):
         low, high = breaks[b], breaks[b + 1]
