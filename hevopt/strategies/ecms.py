@@ -15,151 +15,159 @@ followed.
 
 import numpy as np
 
-from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.bounds.prices import before_steps, drain_at_j, one_price_dual, typical_price_kgpj
+from hevopt.bounds.prices import drain_at_j, one_price_dual, typical_price_kgpj
 from hevopt.bounds.segments import binds, segments
-from hevopt.problem.arrays import Array
-from hevopt.problem.choices import choices_of
 from hevopt.problem.problem import Plan, Problem
-from hevopt.problem.simulation import total_cost_kg
-from hevopt.strategies._rollout import reach_of, roll
-from hevopt.strategies._rollout_kernels import Grid
+from hevopt.strategies._priced_drives import PricedDrive, PricedDrives
 
 _FACTOR_TOLERANCE = 1e-7
-_BRACKET_STEPS_MAX = 60
-_HALVINGS_MAX = 100
+# Factors tried first, as shares of a guess; where the charge keeps on the same side, each is raised to a power.
+_BESIDE, _FURTHER = (0.995, 1.005), 4
+# Times the guess beyond which no factor is tried.
+_DEAREST = 1e6
+# Trials between two factors; how often a trial may leave the charge on the side of the one before until only the
+# halves are tried.
+_TRIALS_MAX, _MISSED_MAX = 100, 4
 # A factor below this share of the guess decides among free controls alone, as the least factor above 0 does.
 _NEGLIGIBLE = 1e-9
-_ENERGY_ROUNDING = 1e-12
-# Passes over the segments; pulls to their path, as shares of the factor; nodes on which the pull is drawn.
+# Passes over the segments; pulls to their path, as shares of the factor.
 _PASSES = 2
 _PULLS = (1e-3, 1e-2, 0.05, 0.15)
-_NODES = 401
-
-
-class _Search:
-    """Rollouts of one problem under prices, and the cheapest of them that ends with enough charge."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self.choices = choices_of(problem)
-        self.bound_reach = reach_of(problem, self.choices, problem.end_min_j)
-        self.free_reach = reach_of(problem, self.choices, problem.window_j[0])
-        self.drain_j = drain_at_j(problem, self.choices, problem.start_j)
-        self.best_cost_kg = np.inf
-        self.best_control, self.best_prices = np.empty(0, np.int64), (np.nan, np.nan)
-
-    def surplus_j(self, price_kgpj: Array, *, to_the_end: bool = False) -> float:
-        """Stored energy above the asked end charge under (time,) prices; `to_the_end`: never below it."""
-        low, high = self.problem.window_j
-        value = self._value_kg(price_kgpj, np.array([low, high]))
-        return self._tried(price_kgpj, value, high - low, to_the_end=to_the_end)
-
-    def follow(self, price_kgpj: Array, energy_j: Array, pull_kgpj: float) -> None:
-        """Try (time,) prices, charge being drawn to (time + 1,) energies by a price on the distance from them."""
-        low, high = self.problem.window_j
-        nodes = np.linspace(low, high, _NODES)
-        value = self._value_kg(price_kgpj, nodes)
-        value += pull_kgpj * np.abs(nodes - energy_j[:, None, None])
-        self._tried(price_kgpj, value, (high - low) / (_NODES - 1), to_the_end=True)
-
-    def _value_kg(self, price_kgpj: Array, nodes_j: Array) -> Array:
-        """(time + 1, mode, node) cost to go under prices, less the worth of what is stored."""
-        choices = self.choices
-        priced = choices.cost_kg + choices.spread(price_kgpj) * self.drain_j
-        before_kgpj = before_steps(price_kgpj)
-        _, _, to_go = shortest_path(choices, priced, before_kgpj, self.problem.start_mode)
-        # A mode without a way on is never entered: the reach is empty there.
-        to_go = np.where(np.isfinite(to_go), to_go, 0.0)
-        of_step = np.concatenate([price_kgpj[:1], price_kgpj])[:, None, None]
-        value: Array = to_go[:, :, None] - of_step * nodes_j
-        return value
-
-    def _tried(self, price_kgpj: Array, value: Array, cell_j: float, *, to_the_end: bool) -> float:
-        """The surplus of the rollout that follows a value function, kept where it is the cheapest with enough."""
-        choices, (low, high) = self.choices, self.problem.window_j
-        reach = self.bound_reach if to_the_end else self.free_reach
-        grid = Grid(np.full(choices.steps + 1, low), cell_j)
-        path, energy_j = roll(self.problem, choices, reach, value, grid)
-        surplus = float(energy_j[-1]) - self.problem.end_min_j
-        if to_the_end or surplus >= -_ENERGY_ROUNDING * high:
-            control = choices.control[path]
-            cost_kg, _ = total_cost_kg(self.problem, control)
-            if cost_kg < self.best_cost_kg:
-                self.best_cost_kg, self.best_control = cost_kg, control
-                self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
-        return surplus
 
 
 def solve(problem: Problem) -> Plan:
     """The cheapest plan of one factor, or a pair of neighbouring factors, that keeps the charge."""
-    search = _Search(problem)
+    drives = PricedDrives(problem)
     guess = one_price_dual(problem)[-1].price_kgpj
-    guess = guess or typical_price_kgpj(search.choices, search.drain_j)
-    every = np.ones(search.choices.steps)
-    cheap, dear = _neutral_factors(search, guess)
-    search.surplus_j(cheap * every, to_the_end=True)
-    search.surplus_j(guess * every, to_the_end=True)
-    if cheap < dear:
-        _change_once(search, dear, cheap)
-        _change_once(search, cheap, dear)
-    if binds(problem, search.choices, search.drain_j, cheap, dear):
-        _follow_segments(search, guess)
-    first, last = search.best_prices
+    guess = guess or typical_price_kgpj(drives.choices, drives.drain_j)
+    cheap, dear = _neutral_factors(drives, guess)
+    drives.under(cheap.factor, to_the_end=True)
+    drives.under(guess, to_the_end=True)
+    if cheap.factor < dear.factor:
+        _change_once(drives, dear, cheap)
+        _change_once(drives, cheap, dear)
+    if binds(problem, drives.choices, drives.drain_j, cheap.factor, dear.factor):
+        _follow_segments(drives, guess)
+    first, last = drives.best_prices
     notes = {"price_kgpj": first, "price_at_end_kgpj": last}
-    return Plan(search.best_control, notes)
+    return Plan(drives.best_control, notes)
 
 
-def _follow_segments(search: _Search, guess: float) -> None:
+def _follow_segments(drives: PricedDrives, guess: float) -> None:
     """Try factors that jump where the window binds, drawn to the charge that they stand for; twice, the second time
     with falls of stored energy as they are along it."""
-    problem, choices = search.problem, search.choices
-    drain_j = search.drain_j
+    problem, choices = drives.problem, drives.choices
+    drain_j = drives.drain_j
     for _ in range(_PASSES):
         found = segments(problem, choices, drain_j, guess)
         for pull in _PULLS:
-            search.follow(
+            drives.follow(
                 found.price_kgpj, found.energy_j, pull * max(guess, found.price_kgpj.max())
             )
         drain_j = drain_at_j(problem, choices, found.energy_j[:-1])
 
 
-def _change_once(search: _Search, before: float, after: float) -> None:
-    """Try factors that change once, halving the cycle until neighbouring steps leave more and less charge."""
-    steps = np.arange(search.choices.steps)
-    less, enough = (0, len(steps)) if before > after else (len(steps), 0)
+def _change_once(drives: PricedDrives, before: PricedDrive, after: PricedDrive) -> None:
+    """Try factors that change once, at neighbouring steps of which one leaves less charge and one enough.
+
+    The change matters only at steps at which the plans of the two factors differ. What one stores up to a step, and
+    the other from it on, tells about where it is; steps further and further from there, up to half-way, are tried
+    until they are found.
+    """
+    steps, apart = np.arange(drives.choices.steps), np.flatnonzero(before.path != after.path)
+
+    def changed(until: int, *, to_the_end: bool = False) -> PricedDrive:
+        factors = np.where(steps < until, before.factor, after.factor)
+        return drives.under(factors, to_the_end=to_the_end)
+
+    left_j = after.surplus_j + (before.energy_j - after.energy_j)[np.append(apart, len(steps))]
+    rising, there = before.factor > after.factor, np.flatnonzero(left_j >= 0.0)
+    less, enough = (0, len(apart)) if rising else (len(apart), 0)
+    middle, stride = int(there[0] if rising else there[-1]), 1
     while abs(enough - less) > 1:
-        middle = (less + enough) // 2
-        surplus = search.surplus_j(np.where(steps < middle, before, after))
-        less, enough = (less, middle) if surplus >= 0 else (middle, enough)
-    search.surplus_j(np.where(steps < less, before, after), to_the_end=True)
+        middle = min(max(middle, min(less, enough) + 1), max(less, enough) - 1)
+        if changed(apart[middle - 1] + 1).surplus_j >= 0:
+            enough = middle
+        else:
+            less = middle
+        halfway = (less + enough) // 2
+        away = min(stride, abs(halfway - middle))
+        middle += away if halfway > middle else -away
+        stride *= 2
+    changed(apart[less] if rising else apart[less - 1] + 1, to_the_end=True)
 
 
-def _neutral_factors(search: _Search, guess: float) -> tuple[float, float]:
+def _neutral_factors(drives: PricedDrives, guess: float) -> tuple[PricedDrive, PricedDrive]:
     """Neighbouring factors of which the cheaper leaves too little charge and the dearer enough.
 
     Where no factor tried leaves enough, both are the dearest.
     """
-    every = np.ones(search.choices.steps)
-    if search.surplus_j(0.0 * every) >= 0:
-        return 0.0, 0.0
-    cheap, dear = 0.98 * guess, 1.02 * guess
-    while search.surplus_j(cheap * every) >= 0:
-        if cheap <= _NEGLIGIBLE * guess:
-            return 0.0, cheap
-        cheap *= 0.8
-    for _ in range(_BRACKET_STEPS_MAX):
-        if search.surplus_j(dear * every) >= 0:
+    below, above = _BESIDE
+    cheap, dear = drives.under(below * guess), None
+    if cheap.surplus_j >= 0:
+        free = drives.under(0.0)
+        if free.surplus_j >= 0:
+            return free, free
+    while cheap.surplus_j >= 0:
+        if cheap.factor <= _NEGLIGIBLE * guess:
+            return free, cheap
+        below **= _FURTHER
+        dear, cheap = cheap, drives.under(below * guess)
+    dear = dear or drives.under(above * guess)
+    while dear.surplus_j < 0:
+        above **= _FURTHER
+        if above > _DEAREST:
+            return dear, dear
+        cheap, dear = dear, drives.under(above * guess)
+    return _neighbours(drives, cheap, dear)
+
+
+def _neighbours(
+    drives: PricedDrives, cheap: PricedDrive, dear: PricedDrive
+) -> tuple[PricedDrive, PricedDrive]:
+    """Two factors between two, as close together as can be, of which one leaves too little charge and one enough.
+
+    Tried is where the plan seems to change from one to the other; where that was off, further on, towards the plan
+    that is missing yet; and where it is off again and again, half-way between.
+    """
+    even, missed, toward = cheap.factor, 0, 0.0
+    for _ in range(_TRIALS_MAX):
+        least = _FACTOR_TOLERANCE * dear.factor
+        if dear.factor - cheap.factor <= least:
             break
-        dear *= 1.25
-    else:
-        return dear, dear
-    for _ in range(_HALVINGS_MAX):
-        if dear - cheap <= _FACTOR_TOLERANCE * dear:
-            break
-        middle = (cheap + dear) / 2
-        if search.surplus_j(middle * every) >= 0:
-            dear = middle
-        else:
-            cheap = middle
+        factor = cheap.factor
+        if missed < _MISSED_MAX:
+            last, even = even, _even_factor(drives, cheap, dear)
+            factor = even + toward * max(0.4 * least, 2.0 * missed * abs(even - last))
+        if not cheap.factor < factor < dear.factor:
+            factor = (cheap.factor + dear.factor) / 2
+        tried = drives.under(factor)
+        before, toward = toward, -1.0 if tried.surplus_j >= 0 else 1.0
+        cheap, dear = (cheap, tried) if toward < 0 else (tried, dear)
+        missed += before == toward
     return cheap, dear
+
+
+def _even_factor(drives: PricedDrives, cheap: PricedDrive, dear: PricedDrive) -> float:
+    """About the factor between two at which the plan changes from too little charge to enough.
+
+    Where their plans part, the dearer factor takes what drains less; at some factor between both ways on are worth
+    the same. From the cheaper plan on, such partings are passed by rising factor until the charge is enough.
+    """
+    both, price = (cheap, dear), np.array([cheap.factor, dear.factor])
+    switches = [drives.switches(drive) for drive in both]
+    k = np.flatnonzero((cheap.path != dear.path) & (switches[0].before == switches[1].before))
+    worth_kg = []
+    for drive, switch in zip(both, switches, strict=True):
+        entry, taken_j = drive.path[k], switch.energy_j[k]
+        fall_j = taken_j + drives.falls_j(entry, k, cheap.energy_j[k] - taken_j)
+        ahead_kg = np.stack([of.to_go_kg[k + 1, switch.mode[k]] for of in both])
+        step_kg = drives.choices.cost_kg[entry] + switch.kg[k]
+        worth_kg.append(step_kg + price[:, None] * fall_j + ahead_kg)
+    below, above = worth_kg[1] - worth_kg[0]
+    share = np.divide(below, below - above, out=np.full(len(k), 0.5), where=below > above)
+    factor = cheap.factor + np.clip(share, 0.0, 1.0) * (dear.factor - cheap.factor)
+    gained_j = np.diff((dear.energy_j - cheap.energy_j)[np.append(k, -1)])
+    order = np.argsort(factor, kind="stable")
+    enough = cheap.surplus_j + np.cumsum(gained_j[order]) >= 0.0
+    return float(factor[order[np.argmax(enough)]]) if enough.any() else dear.factor

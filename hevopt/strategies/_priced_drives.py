@@ -1,0 +1,107 @@
+"""Drives under prices: each step takes least cost + price x (fall of stored energy); see ecms.py."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds.prices import before_steps, drain_at_j
+from hevopt.problem import battery as battery_model
+from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.choices import choices_of
+from hevopt.problem.problem import Problem
+from hevopt.problem.simulation import total_cost_kg
+from hevopt.problem.switching import Switched, switched
+from hevopt.strategies._rollout import reach_of, roll
+from hevopt.strategies._rollout_kernels import Grid
+
+_ENERGY_ROUNDING = 1e-12
+# Nodes on which a pull to a path is drawn.
+_NODES = 401
+
+
+class PricedDrive(NamedTuple):
+    """A drive. factor: its price at the start; surplus_j: what it leaves beyond the asked end charge
+
+    path: (time,) entries; energy_j: (time + 1,) stored; to_go_kg: (time + 1, mode) cost to go that it followed
+    """
+
+    factor: float
+    surplus_j: float
+    path: Indices
+    energy_j: Array
+    to_go_kg: Array
+
+
+class PricedDrives:
+    """Drives of one problem, and the cheapest of them that ends with enough charge."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.choices = choices_of(problem)
+        self.bound_reach = reach_of(problem, self.choices, problem.end_min_j)
+        self.free_reach = reach_of(problem, self.choices, problem.window_j[0])
+        self.drain_j = drain_at_j(problem, self.choices, problem.start_j)
+        self.best_cost_kg = np.inf
+        self.best_control, self.best_prices = np.empty(0, np.int64), (np.nan, np.nan)
+
+    def under(self, price_kgpj: float | Array, *, to_the_end: bool = False) -> PricedDrive:
+        """The drive under a price, or (time,) prices; `to_the_end`: never below the asked end charge."""
+        low, high = self.problem.window_j
+        prices = price_kgpj * np.ones(self.choices.steps)
+        to_go = self._to_go_kg(prices)
+        value = to_go[:, :, None] - _of_step(prices) * np.array([low, high])
+        path, energy_j = self._tried(prices, value, high - low, to_the_end=to_the_end)
+        surplus_j = float(energy_j[-1]) - self.problem.end_min_j
+        return PricedDrive(float(prices[0]), surplus_j, path, energy_j, to_go)
+
+    def follow(self, price_kgpj: Array, energy_j: Array, pull_kgpj: float) -> None:
+        """Try (time,) prices, charge being drawn to (time + 1,) energies by a price on the distance from them."""
+        low, high = self.problem.window_j
+        nodes = np.linspace(low, high, _NODES)
+        value = self._to_go_kg(price_kgpj)[:, :, None] - _of_step(price_kgpj) * nodes
+        value += pull_kgpj * np.abs(nodes - energy_j[:, None, None])
+        self._tried(price_kgpj, value, (high - low) / (_NODES - 1), to_the_end=True)
+
+    def switches(self, drive: PricedDrive) -> Switched:
+        """What a drive switches."""
+        return switched(
+            self.problem.table, self.problem.start_mode, self.choices.control[drive.path]
+        )
+
+    def falls_j(self, entry: Indices, steps: Indices, energy_j: Array) -> Array:
+        """Fall of stored energy with some entries, at their steps and stored energies."""
+        pack, power_w = self.problem.battery, self.choices.power_w[entry]
+        _, voltage, discharge, charge = battery_model.states(pack, energy_j)
+        ohm = np.where(power_w < 0, charge, discharge)
+        drain_w = battery_model.chemical_power_w(pack, power_w, voltage, ohm)
+        return self.choices.step_s[steps] * drain_w
+
+    def _to_go_kg(self, price_kgpj: Array) -> Array:
+        """(time + 1, mode) cost to go under prices; 0 for a mode without a way on, into which no reach leads."""
+        priced = self.choices.cost_kg + self.choices.spread(price_kgpj) * self.drain_j
+        before_kgpj = before_steps(price_kgpj)
+        _, _, to_go = shortest_path(self.choices, priced, before_kgpj, self.problem.start_mode)
+        return np.where(np.isfinite(to_go), to_go, 0.0)
+
+    def _tried(
+        self, price_kgpj: Array, value: Array, cell_j: float, *, to_the_end: bool
+    ) -> tuple[Indices, Array]:
+        """The rollout that follows a value function, kept where it is the cheapest with enough charge."""
+        choices, (low, high) = self.choices, self.problem.window_j
+        reach = self.bound_reach if to_the_end else self.free_reach
+        grid = Grid(np.full(choices.steps + 1, low), cell_j)
+        path, energy_j = roll(self.problem, choices, reach, value, grid)
+        if to_the_end or energy_j[-1] - self.problem.end_min_j >= -_ENERGY_ROUNDING * high:
+            control = choices.control[path]
+            cost_kg, _ = total_cost_kg(self.problem, control)
+            if cost_kg < self.best_cost_kg:
+                self.best_cost_kg, self.best_control = cost_kg, control
+                self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
+        return path, energy_j
+
+
+def _of_step(price_kgpj: Array) -> Array:
+    """(time + 1, 1, 1) prices before the first step and after each."""
+    prices: Array = np.concatenate([price_kgpj[:1], price_kgpj])[:, None, None]
+    return prices
