@@ -238,3 +238,16 @@ sys.exit(", ".join({"numba", "pandas", "matplotlib", "scipy"} & set(sys.modules)
 def test_neither_importing_hevopt_nor_help_loads_what_is_slow_to_load(words):
     command = [sys.executable, "-c", _LOADED, *words.split()]
     assert subprocess.run(command, capture_output=True, text=True).stderr.strip() == ""
+
+
+@pytest.mark.parametrize(
+    "work, spared",
+    [
+        ("hevopt.load_architecture('C2'), hevopt.load_cycle('nedc')", "numba"),
+        ("hevopt.compare", "hevopt.car_files.load"),
+    ],
+    ids=["reading cars without loops", "computing without models of files"],
+)
+def test_reading_and_computing_can_be_loaded_at_once_by_two_processes(work, spared):
+    code = f"import sys, hevopt; {work}; sys.exit({spared!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0

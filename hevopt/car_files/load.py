@@ -27,6 +27,7 @@ from hevopt.car_files.driveline import CouplingFile
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
 from hevopt.car_files.handling import handling_of
+from hevopt.car_files.kinds import COMPONENTS, MACHINES, kind_of
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.parts import check_converter, driveline_of
 from hevopt.car_files.source import SourceFile, source_of
@@ -41,10 +42,6 @@ from hevopt.units import TO_SI
 
 Built = TypeVar("Built")
 Given = TypeVar("Given")
-
-
-COMPONENTS = ("car", "engine", "source", "gearbox", "machine", "machine_2", "machine_3", "battery")
-MACHINES = ("machine", "machine_2", "machine_3")
 
 
 def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None) -> Architecture:
@@ -237,8 +234,3 @@ def _options(data: CouplingFile) -> Options:
         data.axle_ratio or 1.0,
         data.axle_efficiency,
     )
-
-
-def kind_of(component: str) -> str:
-    """The kind of file that a component is: every machine is one."""
-    return "machine" if component in MACHINES else component

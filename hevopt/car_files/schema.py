@@ -12,7 +12,7 @@ from hevopt.car_files.battery import BatteryFile
 from hevopt.car_files.car import CarFile
 from hevopt.car_files.engine import EngineFile
 from hevopt.car_files.gearbox import GearboxFile
-from hevopt.car_files.load import kind_of
+from hevopt.car_files.kinds import kind_of
 from hevopt.car_files.machine import MachineFile
 from hevopt.car_files.meanings import MEANINGS
 from hevopt.car_files.source import SourceFile

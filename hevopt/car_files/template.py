@@ -17,7 +17,8 @@ from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
 
 from hevopt.car_files import schema as file_schema
-from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, load_architecture
+from hevopt.car_files.kinds import COMPONENTS, kind_of
+from hevopt.car_files.load import component_contents, load_architecture
 from hevopt.car_files.meanings import MEANINGS
 from hevopt.car_files.written_out import written_out
 from hevopt.errors import DataError, unknown_name

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hevopt.car.architecture import Architecture
-from hevopt.car_files.load import COMPONENTS
+from hevopt.car_files.kinds import COMPONENTS
 from hevopt.car_files.template import toml_value
 
 ARCHITECTURE = "architecture.toml"

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, load_architecture
+from hevopt.car_files.kinds import COMPONENTS, kind_of
+from hevopt.car_files.load import component_contents, load_architecture
 from hevopt.car_files.schema import MODELS
 from hevopt.driving.cycle import IMPORT, faults_in, load_cycle
 from hevopt.errors import DataError, Fault

@@ -5,7 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hevopt.car_files.load import COMPONENTS, component_contents, kind_of, sorted_changes
+from hevopt.car_files.kinds import COMPONENTS, kind_of
+from hevopt.car_files.load import component_contents, sorted_changes
 from hevopt.car_files.schema import MODELS
 from hevopt.checks.files import (
     ARCHITECTURE,

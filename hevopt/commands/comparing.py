@@ -1,11 +1,11 @@
 """What `hevopt compare` is told, the files it leaves behind, and what it prints."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hevopt.commands.reporting import command_line
 from hevopt.commands.terminal import Progress, show, show_notes, width, write
@@ -22,16 +22,45 @@ if TYPE_CHECKING:
     from hevopt.studies.cold_start import ColdStarts
     from hevopt.studies.comparison import Comparison
     from hevopt.studies.rows import Row
-    from hevopt.studies.settings import Settings
+    from hevopt.studies.settings import Settings, Study
 
 # Settings that results name beside what was changed in the cars.
 _NAMED = ("nox_weight", "allow_shortfall", "free_gear", "refine", "horizon_s")
+
+
+class Read(NamedTuple):
+    """What a comparison reads: cars, cycle, and whether both are those of the published study, as shipped."""
+
+    cars: "Cars"
+    trace: "Cycle"
+    is_study: bool
+
+
+def read_ahead(asked: "Study") -> "Callable[[], Read]":
+    """What gives the cars and the cycle of a comparison, or the error of reading them.
+
+    Another process reads them, where there is a processor for it, so that this one can load what computes.
+    """
+    # Both need these.
+    from hevopt.driving.cycle import load_cycle
+    from hevopt.studies.cars import cars_of
+    from hevopt.studies.halves import ahead
+
+    def read() -> Read:
+        from hevopt.reproduction.published import is_study
+
+        cars = cars_of(asked.architectures, asked.settings)
+        trace = load_cycle(asked.cycle)
+        return Read(cars, trace, is_study(cars.cars, trace))
+
+    return ahead(read)
 
 
 @dataclass(frozen=True)
 class ComparisonJob:
     """Cars on a cycle, the settings that they are solved with, the study file, if they come from one, and the
     strategies that were brought, by name; cold: takes what rows burn from a cold start, where that is asked for
+    is_study: whether published figures may stand beside the results, see `Read`
     """
 
     cars: "Cars"
@@ -40,6 +69,7 @@ class ComparisonJob:
     file: Path | None = None
     brought: "Mapping[str, Strategy]" = field(default_factory=dict)
     cold: "ColdStarts | None" = None
+    is_study: bool = False
 
     @cached_property
     def inputs(self) -> dict[str, str]:
@@ -78,13 +108,6 @@ class ComparisonJob:
         from hevopt.output.cold_tables import cold_contents
 
         return {"cold_start": cold_contents(self.cold)}
-
-    @cached_property
-    def is_study(self) -> bool:
-        """Whether published figures may stand beside the results: cars and cycle are the study's, as shipped."""
-        from hevopt.reproduction.published import is_study
-
-        return is_study(self.cars.cars, self.trace)
 
 
 @dataclass
@@ -235,8 +258,7 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
 
 
 def ready_to_show(job: ComparisonJob) -> None:
-    """Do what `show_comparison` needs beside the rows: read the published study, and whatever a table is written
-    with, by one without rows."""
+    """Load what `show_comparison` writes tables with, by writing some without rows."""
     from hevopt.output.beside_tables import published_table
     from hevopt.output.tables import needed_width
     from hevopt.output.terminal_tables import comparison_table

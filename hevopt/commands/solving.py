@@ -100,14 +100,7 @@ def compare(
     ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
-    from hevopt.commands.brought import brought_to
-    from hevopt.commands.comparing import ComparisonJob, Files, ready_to_show, show_comparison
-    from hevopt.commands.forecast import say_how_long
-    from hevopt.driving.cycle import load_cycle
-    from hevopt.studies import comparison as study
-    from hevopt.studies.by_car import Watch
-    from hevopt.studies.cars import cars_of
-    from hevopt.studies.cold_start import ColdStarts
+    from hevopt.commands.comparing import read_ahead
     from hevopt.studies.settings import given_of, joined, study_of
     from hevopt.studies.study_file import read_study
 
@@ -115,12 +108,21 @@ def compare(
     options = given | {name: value for name, value in named.items() if value is not None}
     below = {"set": {}} if study_path is None else read_study(study_path)
     asked = study_of(joined(below, given_of(_OPTIONS, options)))
+    read = read_ahead(asked)
+
+    from hevopt.commands.brought import brought_to
+    from hevopt.commands.comparing import ComparisonJob, Files, ready_to_show, show_comparison
+    from hevopt.commands.forecast import say_how_long
+    from hevopt.studies import comparison as study
+    from hevopt.studies.by_car import Watch
+    from hevopt.studies.cold_start import ColdStarts
+
     of_study = study_path is not None and "strategies" not in options
     folder = study_path.parent if study_path is not None and of_study else None
     settings, others = brought_to(asked.settings, policy, folder)
-    cars = cars_of(asked.architectures, settings)
+    cars, trace, is_study = read()
     cold = None if cold_start is None else ColdStarts(cold_start)
-    job = ComparisonJob(cars, load_cycle(asked.cycle), settings, study_path, others, cold)
+    job = ComparisonJob(cars, trace, settings, study_path, others, cold, is_study)
     files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit)
     files.check(job)
     compared = partial(

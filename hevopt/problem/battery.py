@@ -8,16 +8,19 @@ closed form: Uoc² = Uoc_i² + 2 (dUoc/dSOC) (E - E_i) / Q within a segment.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
-from hevopt.problem import _battery_kernels as kernels
-from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.frozen import frozen
 from hevopt.problem.once import once
+
+# Compiled loops are read where they are called: a car's file is read without.
+if TYPE_CHECKING:
+    from hevopt.problem._battery_kernels import BatteryArrays
 
 # What simulate lets a plan leave the window by: shares of the window, or of all stored energy if that is more.
 _WINDOW_TOLERANCE, _ENERGY_ROUNDING = 1e-9, 4e-12
@@ -114,8 +117,10 @@ class Battery(Shown):
 
     @property
     @once
-    def arrays(self) -> BatteryArrays:
+    def arrays(self) -> "BatteryArrays":
         """The same for compiled loops."""
+        from hevopt.problem._battery_kernels import BatteryArrays
+
         return BatteryArrays(
             self.soc,
             self.open_circuit_v,
@@ -135,8 +140,10 @@ class Battery(Shown):
         return float(low - slack), float(high + slack)
 
     @once
-    def within_window(self) -> BatteryArrays:
+    def within_window(self) -> "BatteryArrays":
         """The curves cut to the granted window, their ends interpolated: all that a proof may see of them."""
+        from hevopt.problem import _battery_kernels as kernels
+
         whole = self.arrays
         ends = kernels.states(np.array(self.granted_window_j), whole)
         inner = (self.soc > ends[0, 0]) & (self.soc < ends[0, 1])
@@ -146,7 +153,7 @@ class Battery(Shown):
         curves = np.concatenate([first, points, last], axis=1)
         soc, voltage, discharge, charge = (frozen("curves", curve) for curve in curves)
         energy_j = frozen("energy_j", np.concatenate([[low], whole.energy_j[inner], [high]]))
-        return BatteryArrays(
+        return kernels.BatteryArrays(
             soc, voltage, discharge, charge, energy_j, whole.capacity_as, whole.coulombic_efficiency
         )
 
@@ -169,6 +176,8 @@ def soc(battery: Battery, energy: float | Array) -> Array:
 
 def states(battery: Battery, energy: float | Array) -> Array:
     """(4, ...) SOC, open-circuit voltage, discharge and charge resistance at stored energies."""
+    from hevopt.problem import _battery_kernels as kernels
+
     energy = np.asarray(energy, dtype=np.float64)
     return kernels.states(energy.ravel(), battery.arrays).reshape(4, *energy.shape)
 
@@ -178,6 +187,8 @@ def source_power_w(power_w: Array, open_circuit_v: Array | float, ohm: Array | f
 
     NaN beyond what the voltage can deliver.
     """
+    from hevopt.problem import _battery_kernels as kernels
+
     parts = np.broadcast_arrays(power_w, open_circuit_v, ohm)
     flat = kernels.source_powers(*(np.ravel(part).astype(np.float64) for part in parts))
     return flat.reshape(2, *parts[0].shape)

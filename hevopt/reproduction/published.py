@@ -5,13 +5,14 @@ Analysis - Theory and Application (2011), section 4.2: NEDC, warm, change agains
 """
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from hevopt.car.architecture import Architecture
-from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle, load_cycle
-from hevopt.studies.comparison import Comparison
 from hevopt.studies.provenance import cycle_contents
+
+if TYPE_CHECKING:
+    from hevopt.studies.comparison import Comparison
 
 # What the published changes are measured on and against.
 CYCLE, REFERENCE = "nedc", "A baseline"
@@ -137,7 +138,7 @@ STATEMENTS: tuple[Statement, ...] = (
 )  # fmt: skip
 
 
-def cases_of(comparison: Comparison) -> dict[tuple[str, str], Figures]:
+def cases_of(comparison: "Comparison") -> dict[tuple[str, str], Figures]:
     """The figures of every row that has them, by architecture and strategy."""
     return {
         (row.architecture, row.strategy): Figures(row.fuel_corrected_l_per_100km, row.nox_mg_per_km)
@@ -151,6 +152,8 @@ def is_study(cars: Iterable[Architecture], cycle: Cycle) -> bool:
 
     Cars of other names stand in no statement and do not count.
     """
+    from hevopt.car_files.load import load_architecture
+
     if cycle_contents(cycle) != cycle_contents(load_cycle(CYCLE)):
         return False
     return all(
@@ -158,7 +161,7 @@ def is_study(cars: Iterable[Architecture], cycle: Cycle) -> bool:
     )
 
 
-def published_beside(comparison: Comparison) -> list[Published]:
+def published_beside(comparison: "Comparison") -> list[Published]:
     """The published statements with ours, where reference and objective are theirs, and the names; see is_study."""
     theirs = (comparison.cycle, comparison.reference) == (CYCLE, REFERENCE)
     if not theirs or comparison.free_gear or comparison.nox_weight:

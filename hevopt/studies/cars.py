@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from hevopt.car.architecture import Architecture
-from hevopt.car_files.load import load_architecture
 from hevopt.errors import DataError
 from hevopt.files.lookup import shipped_names
 from hevopt.files.shown import printable
@@ -76,6 +75,9 @@ def _car(
     wanted: Architecture | str | Path, settings: Settings
 ) -> tuple[Architecture, dict[str, Any], list[str]]:
     """A car, what was changed in it, and the settings that have no meaning for it."""
+    # Here, as the models of files take long to make, and cars that are read already need none.
+    from hevopt.car_files.load import load_architecture
+
     if isinstance(wanted, Architecture):
         _check_unchanged(wanted, settings)
         return _with_gear(wanted, settings), {}, []

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from hevopt.errors import HevoptError
 
@@ -99,15 +99,61 @@ def halves(
     return results
 
 
+def ahead(work: Callable[[], _Result]) -> Callable[[], _Result]:
+    """What gives work()'s result, or raises its error, once that is needed.
+
+    Until then a process forked from this one does it, where there is a processor for that, and this one something
+    else; what that process does not bring back is done here.
+    """
+    if not two_processors():
+        return work
+    from multiprocessing import get_context
+
+    context = get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    other = context.Process(target=_send, args=(work, there, os.getpid()), daemon=True)
+    other.start()
+    there.close()
+
+    def result() -> _Result:
+        found: list[Any] = []
+        with suppress(EOFError, OSError, pickle.UnpicklingError):
+            found.append(here.recv())
+        here.close()
+        other.join()
+        if not found:
+            return work()
+        if isinstance(found[0], HevoptError):
+            raise found[0]
+        return cast(_Result, found[0])
+
+    return result
+
+
+def _send(work: Callable[[], Any], there: Connection, first: int) -> None:
+    _depend_on(first)
+    # Any other error than those on purpose is met by the first process, which does the work itself then.
+    with suppress(Exception):
+        try:
+            found = work()
+        except HevoptError as error:
+            found = error
+        there.send(found)
+
+
 def _other(
     work: Callable[[int], Any], tickets: int, tally: SharedCount, there: Connection, first: int
 ) -> None:
+    _depend_on(first)
+    tally.in_other_process()
+    there.send(_taken(work, tickets))
+
+
+def _depend_on(first: int) -> None:
     # The first process is interrupted, and ends this one; where it is killed, nobody does.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with, args=(first,), daemon=True).start()
-    tally.in_other_process()
-    there.send(_taken(work, tickets))
 
 
 def _end_with(first: int) -> None:

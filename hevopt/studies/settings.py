@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, create_model
 
 from hevopt.car_files.fields import AuxiliaryPower, Mass, ShiftFuel, Soc, StartFuel
-from hevopt.car_files.load import COMPONENTS
+from hevopt.car_files.kinds import COMPONENTS
 from hevopt.errors import DataError, unknown_name
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import FileModel, checked

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hevopt.car_files.load import COMPONENTS
+from hevopt.car_files.kinds import COMPONENTS
 from hevopt.errors import DataError
 from hevopt.files.lookup import is_path
 from hevopt.files.shown import printable, shown

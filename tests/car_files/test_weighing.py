@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hevopt import load_architecture
-from hevopt.car_files.load import MACHINES
+from hevopt.car_files.kinds import MACHINES
 from hevopt.errors import DataError
 from hevopt.problem.battery import energy_j
 

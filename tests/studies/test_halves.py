@@ -21,7 +21,7 @@ from hevopt.strategies import chosen
 from hevopt.studies.by_car import Watch
 from hevopt.studies.cars import cars_of
 from hevopt.studies.comparison import compare_cars, solve
-from hevopt.studies.halves import SharedCount, halves, two_processors
+from hevopt.studies.halves import SharedCount, ahead, halves, two_processors
 from hevopt.studies.settings import Settings
 
 pytestmark = [
@@ -113,6 +113,55 @@ def test_interrupt_leaves_no_process_behind() -> None:
     with pytest.raises(KeyboardInterrupt):
         halves(work, range(4), SharedCount())
     assert not multiprocessing.active_children()
+
+
+def test_work_ahead_is_done_by_another_process_until_its_result_is_asked_for() -> None:
+    found = ahead(lambda: (os.getpid(), bytes(100_000)))
+
+    time.sleep(0.02)
+    other, sent = found()
+
+    assert other != os.getpid() and len(sent) == 100_000
+    assert not multiprocessing.active_children()
+
+
+def test_error_of_work_ahead_is_raised_where_its_result_is_asked_for() -> None:
+    def work() -> int:
+        raise InfeasibleError("too steep")
+
+    found = ahead(work)
+
+    with pytest.raises(InfeasibleError, match="too steep"):
+        found()
+
+
+def test_work_ahead_that_does_not_come_back_is_done_here() -> None:
+    own = os.getpid()
+
+    def killed() -> int:
+        if os.getpid() != own:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return os.getpid()
+
+    def unsound() -> int:
+        if os.getpid() != own:
+            raise RuntimeError("met by the first process, if at all")
+        return os.getpid()
+
+    assert ahead(killed)() == ahead(unsound)() == own
+
+
+def test_work_ahead_is_left_for_later_where_there_is_no_processor(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done: list[int] = []
+    monkeypatch.setattr("hevopt.studies.halves.two_processors", lambda: False)
+
+    found = ahead(lambda: done.append(os.getpid()))
+    before = list(done)
+    found()
+
+    assert not before and done == [os.getpid()]
 
 
 _KILLED = """

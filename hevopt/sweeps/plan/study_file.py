@@ -17,7 +17,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from hevopt.car.architecture import Architecture
-from hevopt.car_files.load import COMPONENTS, load_architecture
+from hevopt.car_files.kinds import COMPONENTS
+from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError
 from hevopt.files.lookup import find, is_path
