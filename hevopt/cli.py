@@ -7,50 +7,32 @@ import atexit
 import gc
 import os
 import sys
+from collections.abc import Sequence
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from hevopt import __version__
-from hevopt.commands import (
-    architectures,
-    coasting,
-    driving,
-    exporting,
-    importing,
-    listing,
-    mapping,
-    reporting,
-    scores,
-    sizing,
-    solving,
-    studies,
-    sweep,
-    turbo,
-    validation,
-)
 from hevopt.commands.grouped import GroupedCommands, GroupedOptions
 from hevopt.commands.streams import keep_streams
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError, HevoptError, SolverError, comes_from_interrupt
 from hevopt.files.writing import files_told
 
-app = typer.Typer(
-    name="hevopt",
-    help="How little a hybrid could burn on a driving cycle, how close a strategy comes, and the proof.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    cls=GroupedCommands,
-)
-
+# Command -> the module of `commands` that it stands in: a function of its name, or an app of commands of its own.
+_HOMES = {
+    "compare": "solving", "run": "solving", "table": "solving", "drive": "driving", "performance": "driving",
+    "fmu": "exporting", "strategies": "listing", "report": "reporting", "validate": "architectures",
+    "coastdown": "coasting", "sweep": "sweep", "size": "sizing", "pareto": "studies", "sensitivity": "studies",
+    "reproduction": "studies", "turbo-lag": "studies", "validation": "validation", "scores": "scores",
+    "tipin": "turbo", "architectures": "architectures", "cycles": "importing", "maps": "mapping", "engine": "turbo",
+}  # fmt: skip
 _INTERRUPTED = 130
 # Objects made before a search for what nobody holds: more than imports make, which stay.
 _SEARCHED_AFTER = (300_000, 50, 100)
 
 
-@app.callback(invoke_without_command=True)
 def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
@@ -59,33 +41,25 @@ def _root(
         raise typer.Exit
 
 
-for command in (
-    solving.compare,
-    solving.run,
-    solving.table,
-    driving.drive,
-    driving.performance,
-    exporting.fmu,
-    listing.strategies,
-    reporting.report,
-    architectures.validate,
-    coasting.coastdown,
-    sweep.sweep,
-    sizing.size,
-    studies.pareto,
-    studies.sensitivity,
-    studies.reproduction,
-    studies.turbo_lag,
-    validation.validation,
-    scores.scores,
-    turbo.tipin,
-):
-    app.command(cls=GroupedOptions)(command)
-app.add_typer(listing.architectures_app, name="architectures")
-listing.cycles_app.command("import")(importing.import_cycle)
-app.add_typer(listing.cycles_app, name="cycles")
-app.add_typer(mapping.maps_app, name="maps")
-app.add_typer(turbo.engine_app, name="engine")
+def application(words: Sequence[str] = ()) -> typer.Typer:
+    """The command line, of what is typed: the command that its first word names, or where that is none, all."""
+    app = typer.Typer(
+        name="hevopt",
+        help="How little a hybrid could burn on a driving cycle, how close a strategy comes, and the proof.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        cls=GroupedCommands,
+    )
+    app.callback(invoke_without_command=True)(_root)
+    for name in words[:1] if set(words[:1]) & _HOMES.keys() else _HOMES:
+        home, own = import_module(f"hevopt.commands.{_HOMES[name]}"), name.replace("-", "_")
+        if group := getattr(home, f"{own}_app", None):
+            app.add_typer(group, name=name)
+        else:
+            app.command(cls=GroupedOptions)(getattr(home, own))
+    return app
 
 
 def main() -> None:
@@ -110,7 +84,7 @@ def main() -> None:
 def _status_and_message() -> tuple[int, str]:
     try:
         # An int where typer was left by typer.Exit, else what the command returned: None.
-        return app(standalone_mode=False) or 0, ""
+        return application(sys.argv[1:])(standalone_mode=False) or 0, ""
     except HevoptError as error:
         return error.exit_status, f"error: {error}"
     except OSError as error:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hevopt.commands.listing import cycles_app
 from hevopt.commands.options import pairs
 from hevopt.commands.terminal import write
 from hevopt.errors import DataError
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from hevopt.measured.cycles.sampled import ImportedCycle
 
 
+@cycles_app.command("import")
 def import_cycle(
     file: Annotated[
         Path, typer.Argument(help="CSV, TSV, Excel, .mat, VECTO .vdri or VBOX .vbo file.")

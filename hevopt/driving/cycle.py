@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -193,7 +194,7 @@ def _rows(path: Path, text: str, tell: Tell) -> tuple[list[str], list[tuple[int,
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         try:
-            cells = [cell.strip() for cell in next(csv.reader([line], strict=True))]
+            cells = [cell.strip() for cell in _cells(line)]
         except csv.Error as error:
             tell(number, f"not a CSV line ({error})")
             continue
@@ -219,6 +220,12 @@ def _rows(path: Path, text: str, tell: Tell) -> tuple[list[str], list[tuple[int,
     if len(rows) < 2:
         raise DataError(f"{path}: {len(rows)} data lines; a cycle needs at least 2")
     return header, rows
+
+
+def _cells(line: str) -> list[str]:
+    """The cells of a line; csv.Error for a line that is none of CSV."""
+    plain = '"' not in line and len(line) < csv.field_size_limit()
+    return line.split(",") if plain else next(csv.reader([line], strict=True))
 
 
 def _checked_header(path: Path, number: int, cells: list[str]) -> list[str]:
@@ -251,7 +258,7 @@ def _number(line: int, column: str, cell: str, tell: Tell) -> float | None:
         )
         return None
     value = float(cell)
-    if not np.isfinite(value):
+    if not isfinite(value):
         tell(line, f"{column} is {shown(cell)}; a finite number is needed")
         return None
     return value

@@ -6,14 +6,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from hevopt.cli import app
+from hevopt.cli import application
 from hevopt.commands.grouped import EXAMPLES, GROUPS
 
-COMMANDS = typer.main.get_command(app)
+COMMANDS = typer.main.get_command(application())
 
 
 def test_the_commands_are_listed_in_groups_with_an_example_each():
-    out = CliRunner().invoke(app, ["--help"], terminal_width=100).output
+    out = CliRunner().invoke(application(), ["--help"], terminal_width=100).output
     places = [out.index(f"{group.title}:") for group in GROUPS]
     assert places == sorted(places) and "Commands:" not in out
     for group in GROUPS:
@@ -22,6 +22,18 @@ def test_the_commands_are_listed_in_groups_with_an_example_each():
     assert set(EXAMPLES) == set(COMMANDS.commands) and "More:" not in out
     for name in COMMANDS.commands:
         assert f"\n  {name} " in out
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_a_command_comes_alone_where_it_is_named_first(name):
+    alone = typer.main.get_command(application([name, "--help"])).commands
+
+    assert list(alone) == [name]
+    assert [p.name for p in alone[name].params] == [p.name for p in COMMANDS.commands[name].params]
+    for words in ([], ["--help", name], ["--version"], [f"{name}s!"]):
+        assert (
+            typer.main.get_command(application(words)).commands.keys() == COMMANDS.commands.keys()
+        )
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -36,7 +48,7 @@ def test_an_example_is_understood_by_its_command(name):
 
 
 def test_options_are_listed_by_what_they_are_about():
-    out = CliRunner().invoke(app, ["compare", "--help"], terminal_width=100).output
+    out = CliRunner().invoke(application(), ["compare", "--help"], terminal_width=100).output
     titles = [
         "Arguments:",
         "Options:",

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from page_helpers import Opened, until
 from typer.testing import CliRunner
 
-from hevopt.cli import app
+from hevopt.cli import application
 from hevopt.files.lookup import shipped_folder
 from hevopt.pages.render import fixed
 from hevopt.pages.sweep import data as sweep_data
@@ -396,7 +396,7 @@ class Made:
             for job in planned.jobs:
                 store.add(run_job(job))
         words = ["report", str(self.store), "--out", str(self.path)]
-        self.result = CliRunner().invoke(app, words)
+        self.result = CliRunner().invoke(application(), words)
         self.sweep = load_sweep(self.store)
 
 
@@ -420,7 +420,9 @@ def test_the_command_report_makes_the_page_of_a_store(made, tmp_path):
     assert made.path.stat().st_size < 3e6
     other = tmp_path / "other.sqlite"
     other.write_bytes(b"SQLite format 3\0 and no more")
-    done = CliRunner().invoke(app, ["report", str(other), "--out", str(tmp_path / "x.html")])
+    done = CliRunner().invoke(
+        application(), ["report", str(other), "--out", str(tmp_path / "x.html")]
+    )
     assert done.exit_code != 0 and not (tmp_path / "x.html").exists()
 
 
