@@ -16,7 +16,7 @@ def texts_of(car: Architecture) -> dict[str, str]:
     Changes that were made on reading, and the mass that resized parts then had, are in them.
     """
     own, texts = dict(car.contents), {}
-    own["hybrid_mass_kg"] = own["hybrid_mass_kg"] + car.added_kg
+    own["hybrid_mass_kg"] = own.get("hybrid_mass_kg", 0.0) + car.added_kg
     for key in COMPONENTS:
         if key in own:
             texts[f"{key}.toml"] = _text(own[key])

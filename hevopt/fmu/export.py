@@ -19,7 +19,7 @@ from hevopt.car_files.whole import ARCHITECTURE, texts_of
 from hevopt.errors import DataError
 from hevopt.files.writing import check_writable, temporary_folder, write_whole
 from hevopt.fmu.slave import CAR_FOLDER, STEP_FILE, CarSlave
-from hevopt.fmu.variables import OUTPUTS, UNITS, Given, inputs_of, parameters_of
+from hevopt.fmu.variables import UNITS, Given, inputs_of, outputs_of, parameters_of
 from hevopt.forward.commanded import CommandedCar
 from hevopt.forward.lines import line_of
 from hevopt.forward.run import STEP_S, loop_car
@@ -122,7 +122,7 @@ def _described(slave: Fmi2Slave, one: CommandedCar, step_s: float) -> bytes:
     at = [child.tag for child in root].index("ModelVariables")
     root.insert(at, Element("DefaultExperiment", startTime="0", stepSize=repr(step_s)))
     given: list[Given] = [*parameters_of(one.car, step_s), *inputs_of(one)]
-    known = {each.name: each for each in given} | {each.name: each for each in OUTPUTS}
+    known = {each.name: each for each in given} | {each.name: each for each in outputs_of(one)}
     unknowns = SubElement(_child(root, "ModelStructure"), "InitialUnknowns")
     for n, variable in enumerate(_child(root, "ModelVariables"), 1):
         own, kind = known[variable.attrib["name"]], variable[0]

@@ -9,7 +9,7 @@ from pythonfmu.enums import Fmi2Causality, Fmi2Initial, Fmi2Status, Fmi2Variabil
 from hevopt.car_files.load import load_architecture
 from hevopt.car_files.whole import ARCHITECTURE
 from hevopt.errors import DataError, HevoptError
-from hevopt.fmu.variables import OUTPUTS, Given, gear_names, inputs_of, parameters_of
+from hevopt.fmu.variables import Given, gear_names, inputs_of, outputs_of, parameters_of
 from hevopt.forward.commanded import CommandedCar, CommandedSteps, Commands
 
 CAR_FOLDER, STEP_FILE = "car", "step_s.txt"
@@ -17,6 +17,13 @@ _TYPES = {"real": Real, "integer": Integer, "boolean": Boolean}
 # Share of the unit's own step within which a communication step is a whole number of them.
 _WHOLE = 1e-6
 _STEPS_MAX = 1_000_000
+# Of Commands -> the input that it is.
+_COMMANDS = {
+    "force_n": "force_asked_n", "hold": "hold", "grade": "grade", "gear": "gear_asked",
+    "engine_on": "engine_on", "clutch_open": "clutch_open", "lock_up_open": "lock_up_open",
+    "engine_radps": "engine_speed_asked_radps", "engine_nm": "engine_torque_asked_nm",
+    "clutch_closed": "clutch_closed",
+}  # fmt: skip
 _kept: list[dict[str, Any]] = []
 
 
@@ -58,7 +65,7 @@ class CarSlave(Fmi2Slave):  # type: ignore[misc]
                 one, Fmi2Causality.input,
                 Fmi2Variability.continuous if continuous else Fmi2Variability.discrete,
             )  # fmt: skip
-        for told in OUTPUTS:
+        for told in outputs_of(self._one):
             variable = _TYPES[told.kind](
                 told.name, causality=Fmi2Causality.output, description=told.meaning,
                 variability=None if told.kind == "real" else Fmi2Variability.discrete,
@@ -116,17 +123,14 @@ class CarSlave(Fmi2Slave):  # type: ignore[misc]
         return steps
 
     def _commands(self) -> Commands:
-        values = self._values
-        given: dict[str, Any] = {
-            name: values[of]
-            for name, of in (
-                ("force_n", "force_asked_n"), ("hold", "hold"), ("grade", "grade"), ("gear", "gear_asked"),
-                ("engine_on", "engine_on"), ("clutch_open", "clutch_open"), ("machine_nm", "machine_asked_nm"),
-            )
-            if of in values
-        }  # fmt: skip
+        values, one = self._values, self._one
+        given: dict[str, Any] = {name: values[of] for name, of in _COMMANDS.items() if of in values}
+        if "source_power_asked_w" in values:
+            given["engine_nm"] = values["source_power_asked_w"] / one.car.engine.idle_radps
         return Commands(
-            **given, gears=tuple((box, values[name]) for name, box in self._gears.items())
+            **given,
+            gears=tuple((box, values[name]) for name, box in self._gears.items()),
+            machines_nm=tuple((name, values[f"{name}_asked_nm"]) for name in one.asked_machines),
         )
 
     def _get_fmu_state(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from hevopt.car.architecture import Architecture
+from hevopt.car.source import SourceLaw
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward.commanded import CommandedCar, CommandedSteps
 from hevopt.forward.run import STEP_RANGE_S
@@ -85,16 +86,65 @@ def inputs_of(one: CommandedCar) -> list[Given]:
         found.append(Given(name, "integer", "", of_box[0], of_box[0], of_box[-1],
                            f"gear of the {box}, chosen beside the listed one"))  # fmt: skip
     if not car.electric:
-        found += [
-            Given("engine_on", "boolean", "", True, None, None,
-                  "the engine is to turn; it is started and stopped by the unit"),
-            Given("clutch_open", "boolean", "", False, None, None, "the driver's clutch is open"),
-        ]  # fmt: skip
-        if not car.driveline.follows_load:
-            found.append(Given("machine_asked_nm", "real", "N.m", 0.0, None, None,
-                               "torque of the machine while the engine drives, which gives the rest of the "
-                               "force; else the machine gives it all"))  # fmt: skip
+        found.append(Given("engine_on", "boolean", "", True, None, None,
+                           "the engine is to turn; it is started and stopped by the unit"))  # fmt: skip
+        found += _own_speed(one) if one.line.free is not None else _joined(one)
+    return found + [
+        Given(f"{name}_asked_nm", "real", "N.m", 0.0, None, None,
+              f"torque of {_called(one, name)} {_while(one, name)}")
+        for name in one.asked_machines
+    ]  # fmt: skip
+
+
+def _joined(one: CommandedCar) -> list[Given]:
+    """Of an engine behind a clutch or torque converter."""
+    if one.car.driveline.converter is None:
+        return [Given("clutch_open", "boolean", "", False, None, None, "the driver's clutch is open")]  # fmt: skip
+    return [
+        Given("clutch_open", "boolean", "", False, None, None, "the gearbox is in neutral"),
+        Given("lock_up_open", "boolean", "", False, None, None,
+              "the lock-up clutch stays open where it would close"),
+    ]  # fmt: skip
+
+
+def _own_speed(one: CommandedCar) -> list[Given]:
+    """Of an engine that has a speed of its own, or of what gives electricity without a shaft."""
+    engine = one.car.engine
+    if isinstance(engine.law, SourceLaw):
+        return [Given("source_power_asked_w", "real", "W", 0.0, 0.0, float(engine.law.power_w[-1]),
+                      "power that the source is to give, before its converter")]  # fmt: skip
+    idle, top = engine.idle_radps, engine.speed_max_radps
+    found = [
+        Given("engine_speed_asked_radps", "real", "rad/s", idle, None, None,
+              f"speed that the turning engine is to have, kept from {idle:.1f} to {top:.1f} rad/s"),
+        Given("engine_torque_asked_nm", "real", "N.m", 0.0, None, None,
+              "torque of the turning engine, kept within what it gives; below 0 its drag without fuel"),
+    ]  # fmt: skip
+    if one.has_lock_up:
+        found.append(Given("clutch_closed", "boolean", "", False, None, None,
+                           "the clutch between engine and wheels is to be closed, which it is once the speeds "
+                           "meet, above idle speed"))  # fmt: skip
     return found
+
+
+def _called(one: CommandedCar, name: str) -> str:
+    """A machine in a sentence."""
+    number = name.partition("_")[2]
+    if len(one.car.machines) == 1:
+        return "the machine"
+    return f"machine {number or 1}"
+
+
+def _while(one: CommandedCar, name: str) -> str:
+    """When a machine has the torque that it is asked for, and who gives the rest."""
+    if one.line.free is not None:
+        return "while the clutch between engine and wheels is closed; else it follows from all else"
+    if one.car.electric:
+        return "within the force asked for; the first of the machines gives the rest"
+    names = [machine for machine, _ in one.car.driveline.machines]
+    if names.index(name) == one.line.order[0]:
+        return "while the engine drives, which gives the rest of the force; else it gives what is left of it"
+    return "within the force asked for while the engine does not drive; none where its engine is at rest"
 
 
 def _mean(flow: str) -> Callable[[CommandedCar, CommandedSteps | None], float]:
@@ -126,7 +176,7 @@ def _unbalanced(one: CommandedCar, moved: CommandedSteps | None) -> float:
     )
 
 
-OUTPUTS: Sequence[UnitOutput] = (
+_OUTPUTS: Sequence[UnitOutput] = (
     UnitOutput("speed_mps", "real", "m/s", "speed of the car", lambda one, _: one.speed_mps),
     UnitOutput("acceleration_mps2", "real", "m/s2", "acceleration of the car, mean of the step", _acceleration),
     UnitOutput("distance_m", "real", "m", "distance driven", lambda one, _: one.standing.distance_m),
@@ -138,16 +188,13 @@ OUTPUTS: Sequence[UnitOutput] = (
     UnitOutput("nox_kgps", "real", "kg/s", "NOx rate", _mean("nox_kgps")),
     UnitOutput("engine_side_radps", "real", "rad/s", "speed of the engine", lambda one, _: one.side_radps),
     UnitOutput("engine_torque_nm", "real", "N.m", "torque of the engine", _mean("engine_torque_nm")),
-    UnitOutput("machine_speed_radps", "real", "rad/s", "speed of the machine", _mean("machine_speed_radps")),
-    UnitOutput("machine_torque_nm", "real", "N.m", "torque of the machine, braking below 0",
-         _mean("machine_torque_nm")),
     UnitOutput("clutch_torque_nm", "real", "N.m", "torque through the clutch", _mean("clutch_torque_nm")),
     UnitOutput("clutch_loss_w", "real", "W", "power lost in the clutch", _mean("clutch_loss_w")),
     UnitOutput("brake_power_w", "real", "W", "power of the brakes", _mean("brake_power_w")),
     UnitOutput("wheel_power_w", "real", "W", "power of the driveline at the wheels, brakes deducted",
          _mean("wheel_power_w")),
     UnitOutput("road_w", "real", "W", "power of rolling, air and slope", _mean("road_w")),
-    UnitOutput("machine_electric_w", "real", "W", "electric power of the machine", _mean("machine_electric_w")),
+    UnitOutput("machine_electric_w", "real", "W", "electric power of all machines", _mean("machine_electric_w")),
     UnitOutput("battery_power_w", "real", "W", "power at the battery's terminals, > 0 out of it",
          _mean("battery_power_w")),
     UnitOutput("unbalanced_w", "real", "W", "power that does not add up, of all components: rounding",
@@ -160,6 +207,23 @@ OUTPUTS: Sequence[UnitOutput] = (
          lambda one, moved: 0 if moved is None else moved.engine),
     UnitOutput("full", "boolean", "", "engine and machine give all they may, and it is less than asked",
          lambda one, moved: moved is not None and moved.full),
-    UnitOutput("off_map", "boolean", "", "a measured map has ended: fuel or charge are not known",
+    UnitOutput("off_map", "boolean", "",
+         "a machine turns faster than it may, or a gearbox's map has ended: told as at that end",
          lambda one, moved: moved is not None and bool(moved.books.off_map.any())),
 )  # fmt: skip
+
+
+def outputs_of(one: CommandedCar) -> list[UnitOutput]:
+    """What a car tells; NOx where there are data on it, and speed and torque of each machine."""
+    car = one.car
+    told = [each for each in _OUTPUTS if car.engine.nox_known or not each.name.startswith("nox_")]
+    for name, _ in car.driveline.machines:
+        called = _called(one, name)
+        speed, torque = f"{name}_speed_radps", f"{name}_torque_nm"
+        told += [
+            UnitOutput(speed, "real", "rad/s", f"speed of {called}", _mean(speed)),
+            UnitOutput(
+                torque, "real", "N.m", f"torque of {called}, braking below 0", _mean(torque)
+            ),
+        ]
+    return told

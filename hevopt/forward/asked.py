@@ -165,7 +165,8 @@ def follow_asked(
     orders = _Orders(car, cycle, decider, planned, line, from_s)
     task, course = orders.task, orders.course
     driven = loop_car(car, line, handling._replace(driver=driver), task.load_w)
-    driving = Driving(car, line, cycle, driven, task, course, engine_model)
+    start_mps = float(cycle.speed_mps[0])
+    driving = Driving(car, line, start_mps, driven, task, course, engine_model)
     loop = driving.begun(float(planned.energy_j[0]))
     orders.decide(0, driving.seen(loop, from_s[0], task.asks.for_s, exact_s), loop.energy_j)
     driving.advance(driving.begun(loop.energy_j), 0, record, exact_s)

@@ -18,14 +18,12 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.burning import breathed, burnt_kgps
 from hevopt.forward.converting import converting
 from hevopt.forward.lines import Line
+from hevopt.forward.map_ends import within_map
 from hevopt.forward.slipping import slipping
 from hevopt.problem._battery_kernels import trace
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.battery import step_flows
 
-# Share by which the loop keeps idle speed, and knows full load by its table; and where a map ends there, by which
-# full load at a step's beginning may be above that of its mean speed.
-_EDGE, _AHEAD = 1e-4, 2e-3
 CAUSES = {motor.LAUNCH: "launch", motor.CHANGE: "change", motor.START: "start", motor.NONE: "other"}
 
 
@@ -106,7 +104,8 @@ def books_of(
     flows["auxiliary_power_w"] = load_w
     flows |= _joints(line, record, turning, step_s)
     turns = record[:, col.PHASE] == motor.TURNING
-    flows |= _burnt(car, flows, turns, None if breath is None else breath[:, gas.FUEL] / step_s)
+    own = None if breath is None else breath[:, gas.FUEL] / step_s
+    flows |= _burnt(car, flows, turns, turning.side, own)
     if breath is not None:
         flows |= breathed(flows, breath)
     spin = max(machine.spin_efficiency for machine in car.machines)
@@ -181,8 +180,7 @@ def _driven(
 
 def machines_nm(record: Array) -> Array:
     """(machine, step) torques of all machines, in the order of a Line."""
-    torques: Array = np.vstack([record[:, col.MACHINE], record[:, col.COLUMNS :].T])
-    return torques
+    return np.vstack([record[:, col.MACHINE], record[:, col.COLUMNS :].T])
 
 
 def _joints(line: Line, record: Array, turning: Turning, step_s: float) -> dict[str, Array]:
@@ -238,19 +236,11 @@ def _off_gearbox(
 
 
 def _burnt(
-    car: Architecture, flows: Mapping[str, Array], turns: Flags, own_kgps: Array | None
-) -> dict[str, Array]:
+    car: Architecture, flows: Mapping[str, Array], turns: Flags, side_radps: Array, own_kgps: Array | None
+) -> dict[str, Array]:  # fmt: skip
     """Fuel, NOx and the machine's electric power, by the car's own components; own_kgps: fuel not by the map."""
-    torque, speed = flows["engine_torque_nm"], flows["engine_speed_radps"]
-    # At idle speed and at full load, where a measured map may end.
-    idle = car.engine.idle_radps
-    speed = np.where((speed < idle) & (speed > idle * (1 - _EDGE)), idle, speed)
-    most = car.engine.covered_nm(np.where(turns, speed, idle))
-    turning = np.where(turns, speed, 1.0)
-    unknown = np.isnan(car.engine.fuel_kgps(torque, turning))
-    edge = np.where(unknown, _AHEAD, _EDGE)
-    torque = np.where((torque > most) & (torque < most * (1 + edge)), most, torque)
-    mapped, nox = burnt_kgps(car.engine, torque, turning)
+    torque, speed = within_map(car.engine, flows["engine_torque_nm"], side_radps, turns)
+    mapped, nox = burnt_kgps(car.engine, torque, np.where(turns, speed, 1.0))
     fuel = np.where(turns, mapped, 0.0)
     by_map = {} if own_kgps is None else {"map_fuel_kgps": fuel}
     fuel = fuel if own_kgps is None else own_kgps

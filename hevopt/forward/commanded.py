@@ -4,21 +4,21 @@ It is the loop of `follow`, its driver's force and its plan's step given from ou
 torques and books are those of a driven trace, to the last bit where the commands are.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.car.handling import Handling
+from hevopt.car.parts import Clutch
 from hevopt.errors import DataError
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward._acting_kernels import LoopTask
-from hevopt.forward._drive_kernels import Loop
 from hevopt.forward._pedal_kernels import PedalState
-from hevopt.forward.books import Books, books_of
-from hevopt.forward.drivable import check_geared
+from hevopt.forward.books import Books, books_of, within_top
 from hevopt.forward.lines import line_of
+from hevopt.forward.loops import Driving, empty_course
 from hevopt.forward.run import (
     STEP_S,
     check_charge,
@@ -46,8 +46,11 @@ class Commands(NamedTuple):
 
     force_n: at the driven tyres, braking below 0; hold: brakes keep the car where it stands, and the clutch is open
     gear: the listed one; gears: (name of the box, gear) chosen beside it, as in the keys of a Line; () for any
-    engine_on, clutch_open: as wanted; machine_nm: of the machine while the engine drives through the clutch
-    grade: of the road, rise over run
+    engine_on: as wanted; clutch_open: the driver's, or neutral of a gearbox behind a torque converter
+    machines_nm: (name, torque) of machines that are asked for one, see `CommandedCar.asked_machines`; 0 of others
+    lock_up_open: of a torque converter; grade: of the road, rise over run
+    engine_radps, engine_nm, clutch_closed: of an engine that has a speed of its own, and of what joins it to the
+    wheels
     """
 
     force_n: float = 0.0
@@ -56,17 +59,21 @@ class Commands(NamedTuple):
     gears: tuple[tuple[str, int], ...] = ()
     engine_on: bool = True
     clutch_open: bool = False
-    machine_nm: float = 0.0
+    machines_nm: tuple[tuple[str, float], ...] = ()
     grade: float = 0.0
+    lock_up_open: bool = False
+    engine_radps: float = 0.0
+    engine_nm: float = 0.0
+    clutch_closed: bool = False
 
 
 class Standing(NamedTuple):
     """All that a commanded car is between two steps.
 
-    loop, row: of the loop, and what its last step recorded; None before the first
+    loop, row: a Loop or FreeLoop, and what its last step recorded; None before the first
     """
 
-    loop: Loop | None
+    loop: Any
     row: Array | None
     steps: int
     stored_j: float
@@ -104,25 +111,19 @@ class CommandedCar:
         self.car, self.step_s = car, float(step_s)
         whole = whole_handling(car, handling)
         check_step(step_s, whole)
-        check_geared(car, "a unit under commands")
         self.line = line_of(car)
-        if len(car.machines) > 1:
-            raise DataError(
-                f"{car.name}: commands are for a car of one machine, and this one has {len(car.machines)}; "
-                "`hevopt drive` drives it along a cycle"
-            )
-        driver = whole.driver._replace(**_NO_GAINS)
-        self._driven = loop_car(car, self.line, whole._replace(driver=driver))
-        self._slips = whole.tyre.slips
-        self._work = col.work_of(self._driven.ways)
-        self._loads_w = own_loads_w(car)
-        self._speed_mps = float(speed_mps)
+        self._slips, self._speed_mps = whole.tyre.slips, float(speed_mps)
         charge = car.soc_start if soc_start is None else float(soc_start)
         low, high = car.battery.soc_min, car.battery.soc_max
         if not low <= charge <= high:  # nor NaN
             raise DataError(f"soc_start {charge:g}; allowed for {car.name}: {low:g} to {high:g}")
         if not 0.0 <= self._speed_mps <= _FASTEST_MPS:
             raise DataError(f"start speed {speed_mps:g} m/s; allowed: 0 to {_FASTEST_MPS:g} m/s")
+        driver = whole.driver._replace(**_NO_GAINS)
+        self._task = _empty_task(car)
+        self._course = empty_course(self.line, 1, len(car.machines))
+        driven = loop_car(car, self.line, whole._replace(driver=driver), self._task.load_w)
+        self._driving = Driving(car, self.line, self._speed_mps, driven, self._task, self._course)
         stored = float(energy_j(car.battery, charge))
         self.standing = Standing(None, None, 0, stored, 0.0, 0.0, 0.0)
 
@@ -143,48 +144,97 @@ class CommandedCar:
         """State of charge."""
         return float(soc(self.car.battery, self.standing.stored_j))
 
+    @property
+    def asked_machines(self) -> tuple[str, ...]:
+        """Machines that commands may ask for a torque; of the others it follows from all else."""
+        line, names = self.line, [name for name, _ in self.car.driveline.machines]
+        free = line.free
+        if free is not None:
+            fixed = {free.driving} if self.has_lock_up else set(free)
+        else:
+            first_is_asked = not (self.car.electric or self.car.driveline.follows_load)
+            fixed = set() if first_is_asked else {line.order[0]}
+        return tuple(name for n, name in enumerate(names) if n not in fixed)
+
+    @property
+    def has_lock_up(self) -> bool:
+        """Whether a clutch joins an engine that has a speed of its own to the wheels."""
+        return self.line.free is not None and any(
+            isinstance(part, Clutch) for part in self.car.driveline.parts
+        )
+
     def advance(self, commands: Commands, steps: int = 1) -> CommandedSteps:
-        """The car after some steps under the same commands; DataError for a command that is none, and where the
-        battery is empty: the car is then as it was before."""
-        before, task = self.standing, self._task(commands)
-        loop = before.loop
+        """The car after some steps under the same commands.
+
+        DataError for a command that is none, where the battery is empty or cannot give what is asked, and where a
+        measured map ends: the car is then as it was before.
+        """
+        before, loop = self.standing, self.standing.loop
+        self._check(commands)
+        self._fill(commands)
         if loop is None:
-            at_start = task._replace(speed_mps=np.full(2, self._speed_mps))
-            loop = col.begun(self._driven, at_start, before.stored_j)
+            wanted = float(self._task.speed_mps[0])
+            self._task.speed_mps[:] = self._speed_mps
+            loop = self._driving.begun(before.stored_j)
+            self._task.speed_mps[:] = wanted
         start = float(loop.state.speed_mps), float(loop.state.side_radps), before.stored_j
         asked = PedalState(float(commands.force_n), 0.0, 0.0, 0.0, False)
-        loop = loop._replace(pedal=asked, ahead_mps=float(task.speed_mps[0]))
-        record = np.zeros((steps, col.COLUMNS))
-        loop = col.advance(self._driven, task, self._work, loop, 0, record, self.step_s)
+        loop = loop._replace(pedal=asked, ahead_mps=float(self._task.speed_mps[0]))
+        record = np.zeros((steps, col.COLUMNS + len(self.car.machines) - 1))
+        loop = self._driving.advance(loop, 0, record, self.step_s)
         books, starts = self._books(before, record, start)
         flows = books.flows
-        fuel = float(np.nansum(flows["fuel_kgps"])) * self.step_s
+        fuel = float(np.sum(flows["fuel_kgps"])) * self.step_s
         self.standing = Standing(
             loop, record[-1], before.steps + steps, float(books.energy_j[-1]),
             before.distance_m + float(np.sum(flows["speed_mps"])) * self.step_s,
             before.fuel_kg + fuel + starts * self.car.engine.start_fuel_kg,
-            before.nox_kg + float(np.nansum(flows["nox_kgps"])) * self.step_s,
+            before.nox_kg + float(np.sum(flows["nox_kgps"])) * self.step_s,
         )  # fmt: skip
         gear = int(self.line.gears[int(record[-1, col.WAY])])
         return CommandedSteps(
             record, books, gear, int(record[-1, col.PHASE]), bool(record[:, col.FULL].any())
         )
 
-    def _task(self, commands: Commands) -> LoopTask:
-        """One step of a plan that holds for ever."""
-        for name in ("force_n", "machine_nm", "grade"):
-            if not np.isfinite(value := getattr(commands, name)):
+    def _check(self, commands: Commands) -> None:
+        """DataError for numbers that are none, and for what this car has not."""
+        numbers = {
+            name: getattr(commands, name)
+            for name in ("force_n", "grade", "engine_radps", "engine_nm")
+        }
+        for name, value in (*numbers.items(), *commands.machines_nm):
+            if not np.isfinite(value):
                 raise DataError(f"{name} {value}; allowed: finite numbers")
-        way = self._way(commands)
-        wanted = 0.0 if commands.hold else _MOVES_MPS
-        on = commands.engine_on and not self.car.electric
-        ever = np.array([0.0, 1e9])
-        return LoopTask(
-            ever, np.full(2, wanted), np.arctan(np.array([float(commands.grade)])), self._loads_w, ever,
-            np.array([way], dtype=np.int64), np.array([on]),
-            np.array([2 if commands.clutch_open else 0], dtype=np.int64),
-            np.array([float(commands.machine_nm)]), np.zeros(2), np.zeros((1, 0)),
-        )  # fmt: skip
+        for name, _ in commands.machines_nm:
+            if name not in self.asked_machines:
+                allowed = ", ".join(self.asked_machines) or "none"
+                raise DataError(
+                    f"{name} is asked for a torque; of {self.car.name} these may be: {allowed}"
+                )
+        free, converter = self.line.free is not None, self.car.driveline.converter is not None
+        for name, has in (
+            ("clutch_open", not free and not self.car.electric), ("lock_up_open", converter),
+            ("clutch_closed", self.has_lock_up), ("engine_radps", free), ("engine_nm", free),
+        ):  # fmt: skip
+            if getattr(commands, name) and not has:
+                raise DataError(
+                    f"{name} {getattr(commands, name)}; {self.car.name} has no such thing"
+                )
+
+    def _fill(self, commands: Commands) -> None:
+        """The one step of the task, which holds for ever."""
+        task, course, way = self._task, self._course, self._way(commands)
+        asked = dict(commands.machines_nm)
+        torques = [asked.get(name, 0.0) for name, _ in self.car.driveline.machines]
+        task.speed_mps[:] = 0.0 if commands.hold else _MOVES_MPS
+        task.slope_rad[0] = np.arctan(float(commands.grade))
+        task.way[0], task.engine_on[0] = way, commands.engine_on and not self.car.electric
+        task.apart[0] = 2 if commands.clutch_open else 3 if commands.lock_up_open else 0
+        task.machine_nm[0], *task.others_nm[0] = (torques[n] for n in self.line.order)
+        if course is not None:
+            course.engine_radps[0] = min(commands.engine_radps, self.car.engine.speed_max_radps)
+            course.engine_nm[0] = commands.engine_nm
+            course.machine_nm[0], course.closed[0] = torques, commands.clutch_closed
 
     def _way(self, commands: Commands) -> int:
         known = self.line.gears
@@ -206,11 +256,42 @@ class CommandedCar:
     ) -> tuple[Books, int]:
         """The books of the steps, and how often the engine was started."""
         phase = record[:, col.PHASE].astype(np.int64)
-        load_w = self._loads_w[np.where(phase == motor.REST, 0, 1), 0]
+        load_w = self._task.load_w[np.where(phase == motor.REST, 0, 1), 0]
         books = books_of(self.car, self.line, record, start, self.step_s, load_w, before=before.row,
                          slips=self._slips)  # fmt: skip
-        if np.isfinite(before.stored_j):  # else a measured map has ended on the way
-            times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
-            check_charge(self.car, books, record, times)
+        times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
+        _check_known(self.car, books, record, times)
         was = motor.REST if before.row is None else int(before.row[col.PHASE])
         return books, starts_of(phase, was)
+
+
+def _empty_task(car: Architecture) -> LoopTask:
+    """One step of a plan that holds for ever, on a trace that is as long, to be filled."""
+    ever, loads_w = np.array([0.0, 1e9]), own_loads_w(car)
+    return LoopTask(
+        ever, np.zeros(2), np.zeros(1), loads_w, ever, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=bool),
+        np.zeros(1, dtype=np.int64), np.zeros(1), np.zeros(2), np.zeros((1, len(car.machines) - 1)),
+    )  # fmt: skip
+
+
+def _check_known(car: Architecture, books: Books, record: Array, time_s: Array) -> None:
+    """DataError where a measured map or the battery has ended, so that fuel or charge is not known."""
+    flows = books.flows
+    ended = {"engine": np.isnan(flows["fuel_power_w"] + flows["nox_kgps"])}
+    if np.isnan(flows["machine_loss_w"]).any():
+        for (name, _), machine in zip(car.driveline.machines, car.machines, strict=True):
+            speed = within_top(machine, flows[f"{name}_speed_radps"])
+            ended[name] = np.isnan(machine.loss_w(flows[f"{name}_torque_nm"], speed))
+    for name, unknown in ended.items():
+        torque, speed = flows[f"{name}_torque_nm"], flows[f"{name}_speed_radps"]
+        if (off := unknown & np.isfinite(torque) & np.isfinite(speed)).any():
+            n = int(np.argmax(off))
+            raise DataError(
+                f"{car.name}: the map of its {name} has no data at t = {time_s[n]:g} s, {speed[n]:.1f} rad/s and "
+                f"{torque[n]:.1f} Nm; ask for less or another gear, or extend the map"
+            )
+    check_charge(car, books, record, time_s)
+    if not (np.isfinite(record).all() and np.isfinite(books.energy_j).all()):
+        raise DataError(
+            f"{car.name}: more is asked at t = {time_s[0]:g} s than battery and machines can do; ask for less"
+        )

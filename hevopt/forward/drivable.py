@@ -46,15 +46,6 @@ def _part(line: Driveline, name: str) -> Part:
     return next(part for part in line.parts if part.name == name)
 
 
-def check_geared(car: Architecture, what: str) -> None:
-    """DataError for a car that has no clutch and gears that `what` could be done by."""
-    if car.driveline.free_engine_speed:
-        raise DataError(
-            f"{car.name}: {what} is for an engine behind clutch and gears, or none, and this one has a speed of "
-            "its own; `hevopt drive` drives it along a cycle"
-        )
-
-
 def mapped_boxes(line: Driveline) -> list[Gearbox]:
     """Gearboxes whose losses are a map."""
     return [box for box in line.boxes if box.loss is not None]

@@ -38,7 +38,9 @@ def limits_of(
     least_w, most_w = loads_w or (own_w, own_w)
     engine, machine = car.engine, car.machines[first]
     speed = np.arange(0.0, _BEYOND * engine.speed_max_radps, _ENGINE_STEP_RADPS)
-    least = np.nan_to_num(engine.drag_nm(speed))
+    # Idle speed lies between two of these speeds, of which a map may not know the lower one.
+    near = (speed < engine.idle_radps) & (speed > engine.idle_radps - _ENGINE_STEP_RADPS)
+    least = np.nan_to_num(engine.drag_nm(np.where(near, engine.idle_radps, speed)))
     full = engine.covered_nm(speed)
     full = np.where(np.isnan(full) | (speed > engine.speed_max_radps), np.maximum(least, 0.0), full)
     if car.driveline.free_engine_speed or car.driveline.converter is not None:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from hevopt.car.architecture import Architecture
-from hevopt.driving.cycle import Cycle
 from hevopt.forward import _drive_kernels as geared
 from hevopt.forward import _free_loop_kernels as free
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
@@ -19,8 +18,8 @@ from hevopt.problem.arrays import Array
 class Driving:
     """One car on one task; what lies between two steps is a `Loop` or a `FreeLoop`.
 
-    start_radps: speed at which the engine turns, or would if it did, as the cycle begins
-    course: None but of an engine that has a speed of its own
+    start_radps: speed at which the engine turns, or would if it did, as the task begins
+    start_mps: speed of the car as it begins; course: None but of an engine that has a speed of its own
     DataError for an engine model that is none, or that the car is not driven with.
     """
 
@@ -28,17 +27,17 @@ class Driving:
         self,
         car: Architecture,
         line: Line,
-        cycle: Cycle,
+        start_mps: float,
         driven: LoopCar,
         task: LoopTask,
         course: FreeCourse | None,
-        engine_model: EngineModel,
+        engine_model: EngineModel = "map",
     ) -> None:
         check_steady(car, engine_model)
         self._driven, self._task, self.course = driven, task, course
         self._work = geared.work_of(driven.ways)
         idle = car.engine.idle_radps
-        turns = line.ways.wheel[task.way[0], -1] * float(cycle.speed_mps[0])
+        turns = line.ways.wheel[task.way[0], -1] * start_mps
         self._start = float(max(idle, turns / car.vehicle.tyre_radius_m))
         self.breathing: Breathing | None = None
         self._free: FreeCar | None = None
@@ -49,7 +48,7 @@ class Driving:
 
     @property
     def start_radps(self) -> float:
-        """Speed at which the engine turns, or would if it did, as the cycle begins."""
+        """Speed at which the engine turns, or would if it did, as the task begins."""
         if self.course is None:
             return self._start
         return float(max(self._driven.limits.idle_radps, self.course.engine_radps[0]))

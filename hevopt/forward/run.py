@@ -143,7 +143,8 @@ def follow(
     exact_s, record = steps_of(cycle, step_s, handling, len(car.machines))
     task = task_of(car, cycle, plan, cycle.time_s)
     driven = loop_car(car, line, handling, task.load_w)
-    driving = Driving(car, line, cycle, driven, task, plan.course, engine_model)
+    start_mps = float(cycle.speed_mps[0])
+    driving = Driving(car, line, start_mps, driven, task, plan.course, engine_model)
     driving.advance(driving.begun(float(plan.energy_j[0])), 0, record, exact_s)
     return run_of(car, cycle, task, plan.energy_j, line, handling, record, exact_s, driving)
 

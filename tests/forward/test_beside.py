@@ -7,8 +7,7 @@ import pytest
 from forward.drives import constant
 from forward.test_free import OPEN_LOOP, hill
 
-from hevopt import DataError, build_problem, load_architecture, simulate
-from hevopt.forward.commanded import CommandedCar
+from hevopt import build_problem, load_architecture, simulate
 from hevopt.forward.lines import line_of
 from hevopt.forward.performance import performance
 from hevopt.forward.plans import replay_of
@@ -94,10 +93,3 @@ def test_two_machines_are_faster_than_none_and_share_one_battery():
         ~np.isnan(alone.curves.by_gear_n)
     ].all()
     assert boosted.to_100_j > 0
-
-
-def test_a_unit_under_commands_has_one_machine():
-    with pytest.raises(
-        DataError, match="commands are for a car of one machine, and this one has 2"
-    ):
-        CommandedCar(load_architecture(P0_P4))

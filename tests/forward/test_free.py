@@ -10,7 +10,6 @@ from hevopt import DataError, build_problem, load_architecture, load_cycle, simu
 from hevopt.car.handling import DriverGains, Handling
 from hevopt.driving.cycle import Cycle
 from hevopt.forward import _drive_kernels as col
-from hevopt.forward.commanded import CommandedCar
 from hevopt.forward.lines import line_of
 from hevopt.forward.performance import performance
 from hevopt.forward.plans import replay_of
@@ -191,5 +190,3 @@ def test_what_such_a_car_is_not_driven_by_is_told():
     for options in ({"boost_lag_s": 0.5}, {"fills": True}):
         with pytest.raises(DataError, match="no lag here"):
             performance(car, **options)
-    with pytest.raises(DataError, match="under commands is for an engine behind clutch and gears"):
-        CommandedCar(car)
