@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hevopt.commands.reporting import command_line
-from hevopt.commands.terminal import Progress, show, show_notes, width, write
+from hevopt.commands.terminal import Progress, show, show_notes, text_of, width, write
 from hevopt.errors import DataError, HevoptError
 
 if TYPE_CHECKING:
@@ -54,6 +54,15 @@ def read_ahead(asked: "Study") -> "Callable[[], Read]":
         return Read(cars, trace, is_study(cars.cars, trace))
 
     return ahead(read)
+
+
+def cold_starts(degc: float | None) -> "ColdStarts | None":
+    """Who takes what rows burn from a start at a temperature, degrees Celsius; None where none is asked for."""
+    if degc is None:
+        return None
+    from hevopt.studies.cold_start import ColdStarts
+
+    return ColdStarts(degc)
 
 
 @dataclass(frozen=True)
@@ -260,12 +269,11 @@ def show_rows(job: ComparisonJob, comparison: "Comparison", *, wide: bool) -> No
 def ready_to_show(job: ComparisonJob) -> None:
     """Load what `show_comparison` writes tables with, by writing some without rows."""
     from hevopt.output.beside_tables import published_table
-    from hevopt.output.tables import needed_width
     from hevopt.output.terminal_tables import comparison_table
     from hevopt.studies.comparison import Comparison
 
     nothing = Comparison(job.trace.name, [])
-    needed_width(comparison_table(nothing))
+    text_of(comparison_table(nothing))
     if job.is_study:
         published_table(nothing)
 

@@ -111,17 +111,22 @@ def compare(
     read = read_ahead(asked)
 
     from hevopt.commands.brought import brought_to
-    from hevopt.commands.comparing import ComparisonJob, Files, ready_to_show, show_comparison
+    from hevopt.commands.comparing import (
+        ComparisonJob,
+        Files,
+        cold_starts,
+        ready_to_show,
+        show_comparison,
+    )
     from hevopt.commands.forecast import say_how_long
     from hevopt.studies import comparison as study
     from hevopt.studies.by_car import Watch
-    from hevopt.studies.cold_start import ColdStarts
 
     of_study = study_path is not None and "strategies" not in options
     folder = study_path.parent if study_path is not None and of_study else None
     settings, others = brought_to(asked.settings, policy, folder)
     cars, trace, is_study = read()
-    cold = None if cold_start is None else ColdStarts(cold_start)
+    cold = cold_starts(cold_start)
     job = ComparisonJob(cars, trace, settings, study_path, others, cold, is_study)
     files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit)
     files.check(job)
@@ -166,7 +171,7 @@ def run(
 ) -> None:
     """One strategy on one architecture, with its calibration curve and its trajectory."""
     from hevopt.commands.brought import one_of
-    from hevopt.commands.comparing import ComparisonJob, show_rows
+    from hevopt.commands.comparing import ComparisonJob, cold_starts, show_rows
     from hevopt.commands.forecast import say_how_long
     from hevopt.driving.cycle import load_cycle
     from hevopt.files.writing import check_outs
@@ -176,7 +181,6 @@ def run(
     from hevopt.studies.by_car import lost_proofs
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
-    from hevopt.studies.cold_start import ColdStarts
     from hevopt.studies.settings import given_of, study_of
     from hevopt.studies.solved import causal_among, check_horizon, run_case, why_not_causal
 
@@ -185,7 +189,7 @@ def run(
     check_horizon(settings.horizon_s, [name], others)
     job = ComparisonJob(
         cars_of([architecture], settings), load_cycle(cycle), settings, None, others,
-        None if cold_start is None else ColdStarts(cold_start),
+        cold_starts(cold_start),
     )  # fmt: skip
     car, trace = job.cars.cars[0], job.trace
     if out is not None:

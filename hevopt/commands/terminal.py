@@ -2,6 +2,7 @@
 
 import os
 import sys
+from functools import cached_property
 from textwrap import wrap
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 from hevopt.errors import DataError
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.status import Status
     from rich.table import Table
 
@@ -28,15 +30,20 @@ def width() -> int | None:
 
 def show(table: "Table") -> None:
     """Print a table; a terminal narrower than its numbers wraps lines rather than losing digits."""
+    write(text_of(table))
+
+
+def text_of(table: "Table") -> str:
+    """What `show` prints: the table as wide as it is."""
     from rich.console import Console
 
-    from hevopt.output.tables import needed_width
+    from hevopt.output.tables import WIDEST
 
-    console = Console(highlight=False, width=max(Console().width, needed_width(table)))
+    console = Console(highlight=False, width=max(Console().width, WIDEST))
     with console.capture() as capture:
         console.print(table)
     text = capture.get().removesuffix("\n")
-    write(text if sys.stdout.isatty() else "\n".join(map(str.rstrip, text.split("\n"))))
+    return text if sys.stdout.isatty() else "\n".join(map(str.rstrip, text.split("\n")))
 
 
 def show_notes(text: str) -> None:
@@ -64,6 +71,12 @@ class Progress:
         self._status: Status | None = None
         return self
 
+    @cached_property
+    def _console(self) -> "Console":
+        from rich.console import Console
+
+        return Console(stderr=True)
+
     def __call__(self, text: str, done: int, total: int) -> None:
         now = monotonic()
         if now - self._began > _PROGRESS_AFTER_S:
@@ -74,10 +87,9 @@ class Progress:
         self(f"{what}, {text}", done, total)
 
     def _say(self, line: str, now: float) -> None:
-        from rich.console import Console
         from rich.text import Text
 
-        console = Console(stderr=True)
+        console = self._console
         if self._status is not None:
             self._status.update(Text(line))
         elif console.is_terminal:

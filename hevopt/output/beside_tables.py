@@ -32,7 +32,7 @@ def published_table(comparison: Comparison, width: int | None = None) -> Table |
     table.add_column("what differs")
     for statement in statements:
         table.add_row(*statement)
-    over = needed_width(table) - (width or needed_width(table))
+    over = 0 if width is None else needed_width(table) - width
     if over > 0:
         longest = max(len(statement.differs) for statement in statements)
         table.columns[-1].max_width = max(longest - over, _LEAST_PROSE)

@@ -5,7 +5,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-_WIDEST = 400
+# More than any table takes.
+WIDEST = 400
 
 
 def titled_table(title: str | None) -> Table:
@@ -21,7 +22,7 @@ def titled_table(title: str | None) -> Table:
 
 def needed_width(table: Table) -> int:
     """Columns of a terminal that a table takes where nothing in it goes on in the next line."""
-    return Console(width=_WIDEST).measure(table).maximum
+    return Console(width=WIDEST).measure(table).maximum
 
 
 def number(value: float | None, digits: int) -> str:
