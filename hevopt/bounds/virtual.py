@@ -40,9 +40,11 @@ from hevopt.bounds._virtual_kernels import Worst, among, nodes
 from hevopt.bounds.prices import EPSILON
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.battery import Battery
+from hevopt.problem.cells import SplitCells
 from hevopt.problem.choices import Choices, choices_of, without_dominated
 from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
+from hevopt.problem.table import ControlTable
 
 
 class Virtual(NamedTuple):
@@ -107,7 +109,7 @@ def split_of(problem: Problem) -> Split | None:
 
 def _virtual_of(problem: Problem) -> Virtual | None:
     table, counts_nox = problem.table, problem.nox_weight != 0
-    cells = table.cells(nox=counts_nox)
+    cells = _with_nox(table) if counts_nox else _without_nox(table)
     if cells is None:
         return None
     known = _cost_kg(
@@ -134,6 +136,18 @@ def _virtual_of(problem: Problem) -> Virtual | None:
         nodes_w.take(entry),
         cells.slack_kg * (1.0 + problem.nox_weight),
     )
+
+
+@once
+def _with_nox(table: ControlTable) -> SplitCells | None:
+    """A table's cells, which problems of every weight on NOx share."""
+    return table.cells()
+
+
+@once
+def _without_nox(table: ControlTable) -> SplitCells | None:
+    """Those that say nothing of NOx."""
+    return table.cells(nox=False)
 
 
 def _cost_kg(

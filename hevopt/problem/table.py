@@ -49,7 +49,7 @@ class Signals(Shown):
         return type(self), tuple(getattr(self, part.name) for part in fields(self))
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False, weakref_slot=True)
 class ControlTable(Shown):
     """Every control at every step. It copies what it is given, and nothing in it can be changed.
 

@@ -16,8 +16,6 @@ from hevopt.strategies._rollout import reach_of, roll
 from hevopt.strategies._rollout_kernels import Grid
 
 _ENERGY_ROUNDING = 1e-12
-# Nodes on which a pull to a path is drawn.
-_NODES = 401
 
 
 class PricedDrive(NamedTuple):
@@ -51,17 +49,19 @@ class PricedDrives:
         prices = price_kgpj * np.ones(self.choices.steps)
         to_go = self._to_go_kg(prices)
         value = to_go[:, :, None] - _of_step(prices) * np.array([low, high])
-        path, energy_j = self._tried(prices, value, high - low, to_the_end=to_the_end)
+        grid = Grid(np.full(self.choices.steps + 1, low), high - low)
+        path, energy_j = self._tried(prices, value, grid, to_the_end=to_the_end)
         surplus_j = float(energy_j[-1]) - self.problem.end_min_j
         return PricedDrive(float(prices[0]), surplus_j, path, energy_j, to_go)
 
     def follow(self, price_kgpj: Array, energy_j: Array, pull_kgpj: float) -> None:
         """Try (time,) prices, charge being drawn to (time + 1,) energies by a price on the distance from them."""
         low, high = self.problem.window_j
-        nodes = np.linspace(low, high, _NODES)
-        value = self._to_go_kg(price_kgpj)[:, :, None] - _of_step(price_kgpj) * nodes
-        value += pull_kgpj * np.abs(nodes - energy_j[:, None, None])
-        self._tried(price_kgpj, value, (high - low) / (_NODES - 1), to_the_end=True)
+        nodes = energy_j[:, None] + (high - low) * np.array([-1.0, 0.0, 1.0])
+        value = self._to_go_kg(price_kgpj)[:, :, None] - _of_step(price_kgpj) * nodes[:, None]
+        value += pull_kgpj * np.abs(nodes - energy_j[:, None])[:, None]
+        grid = Grid(nodes[:, 0], high - low)
+        self._tried(price_kgpj, value, grid, to_the_end=True)
 
     def switches(self, drive: PricedDrive) -> Switched:
         """What a drive switches."""
@@ -85,12 +85,11 @@ class PricedDrives:
         return np.where(np.isfinite(to_go), to_go, 0.0)
 
     def _tried(
-        self, price_kgpj: Array, value: Array, cell_j: float, *, to_the_end: bool
+        self, price_kgpj: Array, value: Array, grid: Grid, *, to_the_end: bool
     ) -> tuple[Indices, Array]:
         """The rollout that follows a value function, kept where it is the cheapest with enough charge."""
-        choices, (low, high) = self.choices, self.problem.window_j
+        choices, high = self.choices, self.problem.window_j[1]
         reach = self.bound_reach if to_the_end else self.free_reach
-        grid = Grid(np.full(choices.steps + 1, low), cell_j)
         path, energy_j = roll(self.problem, choices, reach, value, grid)
         if to_the_end or energy_j[-1] - self.problem.end_min_j >= -_ENERGY_ROUNDING * high:
             control = choices.control[path]

@@ -109,19 +109,29 @@ def _axes(rules: Rules) -> list[Array]:
 
 
 class _Judged:
-    """Figures of members, worked out for each once: lines through two members that differ in one share a line."""
+    """Figures of members, worked out once for all that drive electrically at the same steps, above one charge."""
 
     def __init__(self, rules: Rules, engine: Indices, *, quick: bool) -> None:
         self.rules, self._engine, self._quick = rules, engine, quick
-        self._found: dict[ElectricLimits, Array] = {}
+        self._driven: dict[tuple[float, float], bytes] = {}
+        self._found: dict[tuple[float, bytes], Array] = {}
 
     def figures(self, limits: Sequence[ElectricLimits]) -> Array:
         """(member, 4); see `figures_of`."""
-        new = [own for own in dict.fromkeys(limits) if own not in self._found]
+        alike = [(own.soc, self._steps(own.power_w, own.speed_mps)) for own in limits]
+        new = {key: own for key, own in zip(alike, limits, strict=True) if key not in self._found}
         if new:
-            found = figures_of(self.rules, new, self._engine, quick=self._quick)
+            found = figures_of(self.rules, list(new.values()), self._engine, quick=self._quick)
             self._found |= zip(new, found, strict=True)
-        return np.array([self._found[own] for own in limits])
+        return np.array([self._found[key] for key in alike])
+
+    def _steps(self, power_w: float, speed_mps: float) -> bytes:
+        """The steps of driving within a power and a speed, as a key."""
+        if (power_w, speed_mps) not in self._driven:
+            steps = self.rules.steps
+            within = (steps.power_w <= power_w) & (steps.speed_mps <= speed_mps)
+            self._driven[power_w, speed_mps] = np.packbits(self.rules.electric & within).tobytes()
+        return self._driven[power_w, speed_mps]
 
 
 def _improved(

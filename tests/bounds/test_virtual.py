@@ -5,7 +5,18 @@ import pytest
 from proofs.draw import draw
 from proofs.split import split_faults
 
-from hevopt import Battery, ControlTable, DataError, Problem, certify, simulate, solve
+from hevopt import (
+    Battery,
+    ControlTable,
+    DataError,
+    Problem,
+    build_problem,
+    certify,
+    load_architecture,
+    load_cycle,
+    simulate,
+    solve,
+)
 from hevopt.bounds import virtual
 from hevopt.bounds._virtual_kernels import among
 from hevopt.bounds.certificate import Proof, Scope
@@ -130,3 +141,16 @@ def test_what_contradicts_the_arrays_is_said(fuel, between, words):
 def test_two_controls_of_one_power_are_no_neighbours():
     with pytest.raises(DataError, match="one battery power"):
         ControlTable.from_arrays(np.ones((1, 2)), np.ones((1, 2)), between="linear")
+
+
+def test_cells_of_a_table_are_found_once_for_all_weights_on_nox(monkeypatch):
+    asked, cells = [], ControlTable.cells
+
+    def counted(table, *, nox=True):
+        asked.append(nox)
+        return cells(table, nox=nox)
+
+    monkeypatch.setattr(ControlTable, "cells", counted)
+    problem = build_problem(load_architecture("C2"), load_cycle("nedc"), levels=3)
+    splits = [virtual.split_of(problem.with_nox_weight(w)) for w in (0.0, 1.0, 7.0)]
+    assert sorted(asked) == [False, True] and None not in splits

@@ -195,3 +195,23 @@ def test_load_points_are_those_of_least_cost_that_charge_enough(problem):
             else:
                 expected = min(mine, key=lambda i: (nox[i], choices.cost_kg[i]), default=-1)
             assert found[level, k] == expected
+
+
+def test_members_that_drive_electrically_at_the_same_steps_are_driven_once(problem, monkeypatch):
+    rules = rules_of(problem)
+    engine, driven = engine_entries(rules), []
+    limits = [
+        ElectricLimits(soc, power, speed)
+        for soc, power, speed in product((0.45, 0.5), (2000.0, 8000.0, 8000.1, 1e9), (9.9, 30.0))
+    ]
+    every = figures_of(rules, limits, engine)
+
+    def counted(rules, members, engine, *, quick):
+        driven.extend(members)
+        return figures_of(rules, members, engine, quick=quick)
+
+    monkeypatch.setattr(conventional, "figures_of", counted)
+    judged = conventional._Judged(rules, engine, quick=False)
+    assert np.array_equal(judged.figures(limits), every)
+    assert np.array_equal(judged.figures(limits[3:5]), every[3:5])
+    assert len(np.unique(every, axis=0)) <= len(driven) < len(limits)
