@@ -1,6 +1,7 @@
 """Stand-ins for the work of a sweep: quick, and able to do to a worker whatever a case might."""
 
 import contextlib
+import gc
 import os
 import signal
 import time
@@ -134,6 +135,8 @@ def act(what):
             while not os.path.exists(file):
                 assert time.monotonic() < deadline
                 time.sleep(0.01)
+        case "rubbish":
+            return {"kept": gc.get_freeze_count(), "searched": gc.isenabled()}
         case "threads":
             return _threads()
         case "raise":

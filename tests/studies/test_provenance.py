@@ -1,5 +1,6 @@
 """Architectures with changed keys, and the digests that tell one from another."""
 
+import ast
 from dataclasses import replace
 
 import pytest
@@ -7,6 +8,9 @@ import pytest
 from hevopt import DataError, load_architecture, load_cycle
 from hevopt.studies.comparison import compare
 from hevopt.studies.provenance import (
+    _files_of,
+    _imported,
+    _reached,
     cycle_contents,
     digest,
     files_digests,
@@ -93,3 +97,23 @@ def test_a_digest_changes_with_any_value_and_not_with_the_order_of_keys():
     assert len(physics_digest()) == 64 and {"hevopt", "python", "numpy"} <= set(versions())
     files = files_digests([car], [cycle])
     assert len(files) == 7 and any(name.endswith("nedc.csv") for name in files)
+
+
+def test_the_text_of_a_module_tells_what_its_syntax_tree_imports():
+    def by_tree(text):
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("hevopt."):
+                module = node.module.removeprefix("hevopt").removeprefix(".")
+                yield from (
+                    f"{module}.{name}".strip(".") for name in ("", *(a.name for a in node.names))
+                )
+
+    def files(modules):
+        return {file for module in modules for file in _files_of(module)}
+
+    reached = _reached()
+    assert len(reached) > 150
+    for path in reached:
+        text = path.read_text("utf-8")
+        found = files(by_tree(text))
+        assert files(_imported(text)) == found and found <= reached

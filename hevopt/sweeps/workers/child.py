@@ -5,6 +5,7 @@ It speaks with the worker that started it over one pipe: `Terms` come in and REA
 """
 
 import ctypes
+import gc
 import json
 import os
 import signal
@@ -66,6 +67,8 @@ def main() -> None:
     """Serve the worker at the other end of the pipe until it goes, or is silent for a minute."""
     descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
     _end_with(parent)
+    # Objects that nobody holds are searched for among those of cases, not among what is loaded, which stays.
+    gc.disable()
     with Connection(descriptor) as pipe, suppress(EOFError, OSError):
         try:
             terms = pipe.recv()
@@ -74,6 +77,8 @@ def main() -> None:
         except Exception as error:
             pipe.send((REFUSED, str(error) or type(error).__name__))
             return
+        gc.freeze()
+        gc.enable()
         pipe.send((READY, None))
         bench = _Runner(pipe, terms, work)
         while pipe.poll(_IDLE_S):

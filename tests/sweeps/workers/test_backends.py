@@ -77,6 +77,11 @@ def test_a_worker_computes_with_one_thread():
     assert (outcome.row["numba"], outcome.row["here"]) == (1, 1)
 
 
+def test_a_worker_searches_for_rubbish_but_not_among_what_it_has_loaded():
+    (outcome,) = outcomes_of(sweep_workers.jobs(1, 1, {0: "rubbish"}), count=1)
+    assert outcome.row["searched"] and outcome.row["kept"] > 1000
+
+
 def test_whatever_a_case_does_is_its_own_failure_and_costs_no_other_case(tmp_path):
     marker = str(tmp_path / "died")
     does = {
