@@ -164,16 +164,16 @@ def inputs_of(
     wheel, n = wheel_radps(state.speed_mps, state.spin_radps, car.body), state.side_radps
     ratio = turning(car.ways.wheel, way, lever.from_way, lever.blend, output)
     low, high = gives
-    rate, capacity, engine = 1.0 - np.exp(-step_s / driver.governor_s), 0.0, split.engine_nm
+    capacity, engine = 0.0, split.engine_nm
     if joint.phase == motor.TURNING:
         target = limits.idle_radps
+        rate = 1.0 if joint.closing > 0.0 else 1.0 - np.exp(-step_s / driver.governor_s)
         if joint.launches:
             target = joint.launch_radps
         elif joint.flows and joint.closing == 0.0:
             target = split.target_radps
         elif joint.closing > 0.0 or joint.cause == motor.CHANGE:
             target = max(ratio * (wheel + pedal.accel_mps2 / car.body.radius_m * step_s), target)
-            rate = 1.0 if joint.closing > 0.0 else rate
         governed = n + rate * (target - n)
         capacity = motor.capacity_nm(joint, split.clutch_nm, n - ratio * wheel, car.body.clutch)
         if joint.flows and capacity > 0.0:

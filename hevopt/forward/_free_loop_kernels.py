@@ -22,6 +22,7 @@ from hevopt.forward._drive_kernels import (
     record_step,
 )
 from hevopt.forward._free_kernels import (
+    HALVINGS,
     Allotted,
     FreeCar,
     FreeCourse,
@@ -43,8 +44,6 @@ _FEEDBACK_SPEED_RADPS = 50.0
 _FASTER, _STOPS_BELOW = 1.1, 1.05
 # Rounds in which the governor takes over what the engine's torque is off, and the share of it that is rounding.
 _ROUNDS, _SAME = 4, 1e-12
-# Of the share of a start that the battery has power for.
-_HALVINGS = 30
 
 
 class FreeLoop(NamedTuple):
@@ -116,7 +115,7 @@ def _started(
     """
     limits = car.loop.limits
     low, high, share, load = 0.0, 1.0, 1.0, load_w
-    for _ in range(_HALVINGS):
+    for _ in range(HALVINGS):
         reached = share * side_accel
         spun_nm = (row[col.SIDE_PER_N] * reached + row[col.SIDE_PER_W] * accel) / row[
             col.SIDE_ENGINE

@@ -106,7 +106,7 @@ class Decider:
         if line.free_engine_speed or line.converter is not None:
             wanted += ["engine_speed_radps", "engine_torque_nm"]
         # (row, control, flow)
-        self._wanted = np.stack([flows[name][:, columns] for name in wanted], axis=-1)
+        self._wanted = np.moveaxis(flows.several(wanted)[:, :, columns], 0, -1)
         self._turning = turning_modes(problem)
         on = np.array([state.engine_on for state in self._states])
         self._keeps: list[Flags] = [

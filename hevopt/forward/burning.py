@@ -20,10 +20,12 @@ def burnt_kgps(engine: Engine, torque_nm: Array, speed_radps: Array) -> tuple[Ar
     """(step,) fuel and NOx of an engine that turns; NaN where a map knows nothing, that lowest torque included."""
     fuel = engine.fuel_kgps(torque_nm, speed_radps)
     nox = np.where(fuel == 0, 0.0, engine.nox_kgps(torque_nm, speed_radps))
-    lowest, drag = engine.law.lowest_nm, engine.drag_nm(speed_radps)
-    k = np.flatnonzero(np.isnan(fuel) & (torque_nm < lowest) & (torque_nm > drag))
+    lowest = engine.law.lowest_nm
+    k = np.flatnonzero(np.isnan(fuel) & (torque_nm < lowest))
+    k = k[torque_nm[k] > engine.drag_nm(speed_radps[k])]
     if len(k):
-        share = (torque_nm[k] - drag[k]) / (lowest - drag[k])
+        drag = engine.drag_nm(speed_radps[k])
+        share = (torque_nm[k] - drag) / (lowest - drag)
         at_lowest = np.full(len(k), lowest), speed_radps[k]
         fuel[k], nox[k] = (share * of(*at_lowest) for of in (engine.fuel_kgps, engine.nox_kgps))
     return fuel, nox

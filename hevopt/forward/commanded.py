@@ -18,13 +18,13 @@ from hevopt.forward._acting_kernels import LoopTask
 from hevopt.forward._pedal_kernels import PedalState
 from hevopt.forward.books import Books, books_of, within_top
 from hevopt.forward.lines import line_of
+from hevopt.forward.loads import own_loads_w
 from hevopt.forward.loops import Driving, empty_course
 from hevopt.forward.run import (
     STEP_S,
     check_charge,
     check_step,
     loop_car,
-    own_loads_w,
     starts_of,
     whole_handling,
 )
@@ -255,14 +255,12 @@ class CommandedCar:
         self, before: Standing, record: Array, start: tuple[float, float, float]
     ) -> tuple[Books, int]:
         """The books of the steps, and how often the engine was started."""
-        phase = record[:, col.PHASE].astype(np.int64)
-        load_w = self._task.load_w[np.where(phase == motor.REST, 0, 1), 0]
-        books = books_of(self.car, self.line, record, start, self.step_s, load_w, before=before.row,
+        books = books_of(self.car, self.line, record, start, self.step_s, self._task.load_w, before=before.row,
                          slips=self._slips)  # fmt: skip
         times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
         _check_known(self.car, books, record, times)
         was = motor.REST if before.row is None else int(before.row[col.PHASE])
-        return books, starts_of(phase, was)
+        return books, starts_of(books.recorded.engine, was)
 
 
 def _empty_task(car: Architecture) -> LoopTask:

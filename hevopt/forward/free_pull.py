@@ -21,8 +21,8 @@ from hevopt.forward._limits_kernels import Motors
 from hevopt.forward._pedal_kernels import PedalState
 from hevopt.forward.forces import Curves, resistance_n, tabulated
 from hevopt.forward.lines import Line
+from hevopt.forward.loads import own_loads_w
 from hevopt.forward.loops import free_car
-from hevopt.forward.run import own_loads_w
 from hevopt.problem.arrays import Array, Flags
 from hevopt.units import STANDARD_GRAVITY_MPS2
 

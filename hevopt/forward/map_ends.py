@@ -3,30 +3,46 @@
 The loop knows idle speed and full load as a step begins; fuel is that of the step's mean speed.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hevopt.car.engine import Engine
 from hevopt.forward.burning import burnt_kgps
-from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.arrays import Array
 
 # Share by which the loop keeps idle speed, and knows full load by its table.
 _EDGE = 1e-4
 
 
-def within_map(
-    engine: Engine, torque_nm: Array, side_radps: Array, turns: Flags
-) -> tuple[Array, Array]:
-    """(step,) torque and speed at which steps are read, those at the map's end that leave it on their way.
+class Burning(NamedTuple):
+    """Torque and speed at which steps are read, and fuel and NOx there; all (step,)."""
 
-    torque_nm: (step,); side_radps: (step + 1,) speed around every step; turns: (step,) whether it turns by itself
+    torque_nm: Array
+    speed_radps: Array
+    fuel_kgps: Array
+    nox_kgps: Array
+
+
+def within_map(engine: Engine, torque_nm: Array, begins_radps: Array, ends_radps: Array) -> Burning:
+    """What an engine burns that turns by itself, steps at the map's end that leave it on their way read there.
+
+    torque_nm: (step,); begins_radps, ends_radps: (step,) speed as each step begins and ends
     """
-    idle, speed = engine.idle_radps, (side_radps[1:] + side_radps[:-1]) / 2
-    begins = np.maximum(side_radps[:-1], idle)
-    at = np.where(turns, speed, idle)
-    unknown = turns & np.isnan(np.add(*burnt_kgps(engine, torque_nm, at)))
-    reaches_idle = np.maximum(side_radps[1:], side_radps[:-1]) > idle * (1 - _EDGE)
-    below = (speed < idle) & (speed > idle * (1 - _EDGE)) | (speed < idle) & unknown & reaches_idle
-    speed = np.where(below, idle, speed)
-    most = engine.covered_nm(np.where(turns, speed, idle))
-    given = np.where(unknown, np.fmax(engine.covered_nm(begins), most), most) * (1 + _EDGE)
-    return np.where((torque_nm > most) & (torque_nm < given), most, torque_nm), speed
+    idle, speed = engine.idle_radps, (ends_radps + begins_radps) / 2
+    fuel, nox = burnt_kgps(engine, torque_nm, speed)
+    unknown = np.isnan(fuel + nox)
+    reaches_idle = np.maximum(ends_radps, begins_radps) > idle * (1 - _EDGE)
+    below = (speed < idle) & ((speed > idle * (1 - _EDGE)) | unknown & reaches_idle)
+    at = np.where(below, idle, speed)
+    most = engine.covered_nm(at)
+    given = most * (1 + _EDGE)
+    if unknown.any():
+        begun = engine.covered_nm(np.maximum(begins_radps[unknown], idle))
+        given[unknown] = np.fmax(begun, most[unknown]) * (1 + _EDGE)
+    beyond = (torque_nm > most) & (torque_nm < given)
+    torque = np.where(beyond, most, torque_nm)
+    k = np.flatnonzero(below | beyond)
+    if len(k):
+        fuel[k], nox[k] = burnt_kgps(engine, torque[k], at[k])
+    return Burning(torque, at, fuel, nox)

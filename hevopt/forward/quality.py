@@ -15,7 +15,6 @@ highest and the speed more (40 CFR 600.109-08, there ±2 mph and ±1 s; ±2 km/h
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hevopt.car.vehicle import Vehicle, tractive_force_n
@@ -102,9 +101,9 @@ def violations(
     """Every time a trace lies outside its tolerance; all (time,), evenly spaced."""
     step_s = time_s[1] - time_s[0]
     reach = round(tolerance_s / step_s)
-    window = sliding_window_view(np.pad(wanted_mps, reach, mode="edge"), 2 * reach + 1)
-    high = driven_mps - window.max(axis=1) - tolerance_mps
-    low = window.min(axis=1) - tolerance_mps - driven_mps
+    around = np.pad(wanted_mps, reach, mode="edge")
+    high = driven_mps - _highest(around, 2 * reach + 1) - tolerance_mps
+    low = -_highest(-around, 2 * reach + 1) - tolerance_mps - driven_mps
     beyond = np.maximum(high, low)
     edges = np.diff(np.concatenate([[False], beyond > 0, [False]]).astype(np.int8))
     return tuple(
@@ -113,6 +112,15 @@ def violations(
         )
         for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     )
+
+
+def _highest(values: Array, count: int) -> Array:
+    """The highest of each so many neighbours, found from the highest of half as many."""
+    found, width = values, 1
+    while width < count:
+        moved = min(width, count - width)
+        found, width = np.maximum(found[:-moved], found[moved:]), width + moved
+    return found
 
 
 def _trace(vehicle: Vehicle, speed_mps: Array) -> _Trace:
@@ -139,7 +147,10 @@ def _smooth(values: Array) -> Array:
     smooth = values.copy()
     if len(values) < _SMOOTHED:
         return smooth
-    smooth[half:-half] = sliding_window_view(values, _SMOOTHED).mean(axis=1)
+    total = np.zeros(len(values) - 2 * half)
+    for first in range(_SMOOTHED):
+        total += values[first : first + len(total)]
+    smooth[half:-half] = total / _SMOOTHED
     smooth[1], smooth[-2] = values[:3].mean(), values[-3:].mean()
     return smooth
 

@@ -19,12 +19,13 @@ from hevopt.forward.books import Books, books_of
 from hevopt.forward.breathing import EngineModel
 from hevopt.forward.limits import beside_of, limits_of
 from hevopt.forward.lines import Line, line_of
+from hevopt.forward.loads import loads_at, loads_w
 from hevopt.forward.loops import Driving
 from hevopt.forward.plans import ForwardPlan
 from hevopt.forward.quality import DriveQuality, drive_quality
 from hevopt.forward.stability import check_gains
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.battery import energy_j, soc
+from hevopt.problem.battery import energy_j
 
 _Part = TypeVar("_Part", Tyre, Clutch, Shifting, DriverGains)
 STEP_S = 0.01
@@ -37,7 +38,8 @@ class ForwardRun(Shown):
     """A driven trace; (step,) but for what is a state: time_s, speed_mps, wanted_mps, energy_j, soc, (step + 1,).
 
     gear: the one listed; engine: 0 at rest, 1 started, 2 turning, 3 stopped
-    planned_j: (step + 1,) stored energy of the plan; full: engine and machine give all, and it is too little
+    plan_j: (time + 1,) stored energy of the plan over the cycle
+    full: engine and machine give all, and it is too little
     starts, start_fuel_kg: of the engine, and what they count
     """
 
@@ -52,8 +54,7 @@ class ForwardRun(Shown):
     engine: Indices
     full: np.ndarray
     books: Books
-    soc: Array
-    planned_j: Array
+    plan_j: Array
     quality: DriveQuality
     starts: int
     start_fuel_kg: float
@@ -91,6 +92,17 @@ class ForwardRun(Shown):
     def energy_j(self) -> Array:
         """(step + 1,) stored energy."""
         return self.books.energy_j
+
+    @property
+    def soc(self) -> Array:
+        """(step + 1,) state of charge."""
+        return self.books.soc
+
+    @property
+    def planned_j(self) -> Array:
+        """(step + 1,) stored energy of the plan."""
+        planned_j: Array = np.interp(self.time_s, self.cycle.time_s, self.plan_j)
+        return planned_j
 
     @property
     def missed(self) -> bool:
@@ -205,22 +217,10 @@ def task_of(car: Architecture, cycle: Cycle, plan: ForwardPlan, from_s: Array) -
         return np.array(values, dtype=np.float64)
 
     return LoopTask(
-        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), _loads_w(car, cycle),
+        own(cycle.time_s), own(cycle.speed_mps), np.arctan(own(cycle.grade[:-1])), loads_w(car, cycle),
         own(from_s), plan.way,
         plan.engine_on, plan.open_while, plan.machine_nm, plan.energy_j, plan.others_nm,
     )  # fmt: skip
-
-
-def _loads_w(car: Architecture, cycle: Cycle) -> Array:
-    """(2, time) electric load while the engine is at rest and while it turns: the cycle's, or the car's own."""
-    if cycle.auxiliary_w is not None:
-        return np.array([cycle.auxiliary_w[:-1]] * 2, dtype=np.float64)
-    return np.repeat(own_loads_w(car), len(cycle.time_s) - 1, axis=1)
-
-
-def own_loads_w(car: Architecture) -> Array:
-    """(2, 1) electric load of the car's file while the engine is at rest and while it turns."""
-    return np.array([[car.vehicle.load_w(engine_on=on)] for on in (False, True)], dtype=np.float64)
 
 
 def starts_of(phase: Indices, before: int) -> int:
@@ -238,22 +238,17 @@ def run_of(
     side = driving.start_radps if on else 0.0
     breath = None if driving.breathing is None else driving.breathing.breath
     time_s = cycle.time_s[0] + step_s * np.arange(len(record) + 1)
-    at = np.searchsorted(cycle.time_s, time_s[:-1] + 1e-9, "right") - 1
-    rests = record[:, col.PHASE] == motor.REST
-    load_w = task.load_w[np.where(rests, 0, 1), np.minimum(at, task.load_w.shape[1] - 1)]
     start = start_mps, side, float(planned_j[0])
-    slips = handling.tyre.slips
-    books = books_of(car, line, record, start, step_s, load_w, breath, slips=slips)
+    load_w = loads_at(task, time_s[:-1])
+    books = books_of(car, line, record, start, step_s, load_w, breath, slips=handling.tyre.slips)
     check_charge(car, books, record, time_s)
-    speed = np.append(start_mps, record[:, col.SPEED])
+    said = books.recorded
+    speed = np.append(start_mps, said.speed_mps)
     wanted = np.interp(time_s, cycle.time_s, cycle.speed_mps)
-    phase = record[:, col.PHASE].astype(np.int64)
-    starts = starts_of(phase, motor.REST)
+    starts = starts_of(said.engine, motor.REST)
     return ForwardRun(
-        car, cycle, step_s, handling, time_s, speed, wanted,
-        line.gears[record[:, col.WAY].astype(np.int64)], phase, record[:, col.FULL] > 0, books,
-        soc(car.battery, books.energy_j), np.interp(time_s, cycle.time_s, planned_j),
-        drive_quality(car.vehicle, time_s, speed, wanted), starts,
+        car, cycle, step_s, handling, time_s, speed, wanted, line.gears[said.way], said.engine, said.full,
+        books, planned_j, drive_quality(car.vehicle, time_s, speed, wanted), starts,
         starts * car.engine.start_fuel_kg,
     )  # fmt: skip
 
@@ -278,6 +273,9 @@ def check_step(step_s: float, handling: Handling) -> None:
 
 def check_charge(car: Architecture, books: Books, record: Array, time_s: Array) -> None:
     """DataError where the battery is empty, or its power too little; record: of the loop; time_s: (step + 1,)."""
+    # What is lost once stays lost.
+    if books.energy_j.min() >= 0 and np.isfinite(record[-1, col.ENERGY]):
+        return
     # Outside a measured map no energy is known either, and that is told with the run; the loop's own has no end.
     beyond = ~np.isfinite(books.energy_j) & ~books.off_map.any()
     beyond[1:] |= ~np.isfinite(record[:, col.ENERGY])

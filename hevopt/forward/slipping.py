@@ -4,19 +4,22 @@ import numpy as np
 
 from hevopt.car.architecture import Architecture
 from hevopt.forward import _drive_kernels as col
+from hevopt.forward._books_kernels import Begin
 from hevopt.forward._slip_kernels import DRIVEN_SHARE
 from hevopt.problem.arrays import Array
 
 
 def slipping(
-    car: Architecture, record: Array, wheel: Array, spin: Array, kinetic_w: Array, step_s: float
+    car: Architecture, record: Array, begin: Begin, kinetic_w: Array, step_s: float
 ) -> dict[str, Array]:
     """(step,) powers that differ from those of tyres that roll, W, and the slip after every step.
 
-    wheel, spin: (step + 1,) speed of the wheels, and what of it is beyond rolling, rad/s
-    kinetic_w: (step,) as of wheels that roll
+    begin: the car before the first step; kinetic_w: (step,) as of wheels that roll
     tyre_slip_w: what slides, never negative; tyre_spring_w: what bends the tyres and comes back
     """
+    spin = np.append(begin.spin_radps, record[:, col.SPIN])
+    speed = np.append(begin.speed_mps, record[:, col.SPEED])
+    wheel = speed / car.vehicle.tyre_radius_m + spin
     rolls = _mean(wheel - spin)
     driven_kgm2 = DRIVEN_SHARE * car.vehicle.wheel_inertia_kgm2
     beyond = driven_kgm2 * np.diff(spin * (2 * wheel - spin)) / (2 * step_s)

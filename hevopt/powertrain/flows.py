@@ -3,7 +3,7 @@
 Of every control they would take ten times the memory of all that a strategy reads; a plan has one control per step.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,16 +38,23 @@ class PowerFlows(Flows):
     def __getitem__(self, name: str) -> Array:
         if name not in self._names:
             raise KeyError(name)
+        flow: Array = self.several((name,))[0]
+        return flow
+
+    def several(self, names: Sequence[str]) -> Array:
+        """(name, time, control) of some flows, worked out together."""
         columns = sum(len(branch.labels) for branch in self.branches)
-        whole, first = np.zeros((self.steps, columns)), 0
+        whole, first = np.zeros((len(names), self.steps, columns)), 0
         for branch in self.branches:
             width = len(branch.labels)
             for piece in branch.pieces:
-                step, values = piece.here.shafts.step, self._one(piece.here, piece.given, name)
-                if piece.slot is None:
-                    whole[step, first : first + width] = values
-                else:
-                    whole[step, first + piece.slot] = np.broadcast_to(values, (len(step), 1))[:, 0]
+                step, found = piece.here.shafts.step, self._some(piece.here, piece.given, names)
+                for n, name in enumerate(names):
+                    if piece.slot is None:
+                        whole[n, step, first : first + width] = found[name]
+                    else:
+                        one = np.broadcast_to(found[name], (len(step), 1))
+                        whole[n, step, first + piece.slot] = one[:, 0]
             first += width
         return whole
 
@@ -121,16 +128,18 @@ class PowerFlows(Flows):
                 if len(state):
                     yield piece, state, taken
 
-    def _one(self, here: Setting, given: Mapping[str, Array], name: str) -> Array:
-        """The flow of a name among those of `_of`; of torques and the engine's speed nothing else is worked out."""
-        if name == "engine_speed_radps":
-            return here.engine_radps[:, None]
+    def _some(
+        self, here: Setting, given: Mapping[str, Array], names: Sequence[str]
+    ) -> Mapping[str, Array]:
+        """Some flows among those of `_of`; of torques and the engine's speed nothing else is worked out."""
         turns = {f"{actuator}_torque_nm": actuator for actuator in (ENGINE, *self.machines)}
-        actuator = turns.get(name)
-        if actuator is None:
-            return self._of(here, given)[name]
-        torques = given if actuator in given else completed(here, given)
-        return torques.get(actuator, np.zeros((1, 1)))
+        if not {*names} <= {"engine_speed_radps", *turns}:
+            return self._of(here, given)
+        wanted = {turns[name] for name in names if name in turns}
+        torques = given if wanted <= {*given} else completed(here, given)
+        none = np.zeros((1, 1))
+        found = {name: torques.get(actuator, none) for name, actuator in turns.items()}
+        return found | {"engine_speed_radps": here.engine_radps[:, None]}
 
     def _of(self, here: Setting, given: Mapping[str, Array]) -> dict[str, Array]:
         """name -> flows of (state, level) torques given, some (state, 1)."""

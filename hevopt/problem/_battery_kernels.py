@@ -149,6 +149,45 @@ def trace(
     return energy
 
 
+@compiled(inline="always")
+def lossy_current(
+    power: float, voltage: float, resistance: float, efficiency: float
+) -> tuple[float, float]:
+    """Current, and what resistance and incomplete charging lose at it."""
+    current = source_power(power, voltage, resistance)[0] / voltage
+    uncharged = (1.0 - efficiency) * max(-voltage * current, 0.0)
+    return current, resistance * (current * current) + uncharged
+
+
+@compiled()
+def currents(before: Array, power: Array, battery: BatteryArrays) -> Array:
+    """(3, time) loss, voltage at the terminals and current of steps, by stored energy before each and its power."""
+    result = np.empty((3, len(power)))
+    for k in range(len(power)):
+        _, voltage, discharge, charging = state_at(before[k], battery)
+        ohm = charging if power[k] < 0.0 else discharge
+        current, loss = lossy_current(power[k], voltage, ohm, battery.coulombic_efficiency)
+        result[0, k], result[1, k], result[2, k] = loss, voltage - ohm * current, current
+    return result
+
+
+@compiled()
+def followed(start_j: float, power: Array, step_s: float, battery: BatteryArrays) -> Array:
+    """(4, time + 1) stored energy and state of charge as of `trace`, and of the step that follows, none behind the
+    last, the rate at which stored energy falls and the loss."""
+    steps, energy = len(power), start_j
+    result = np.zeros((4, steps + 1))
+    for k in range(steps):
+        soc, voltage, discharge, charging = state_at(energy, battery)
+        kept = battery.coulombic_efficiency
+        _, loss = lossy_current(power[k], voltage, charging if power[k] < 0.0 else discharge, kept)
+        after = energy - step_s * chemical_power(power[k], voltage, discharge, charging, kept)
+        result[0, k], result[1, k], result[2, k] = energy, soc, (energy - after) / step_s
+        result[3, k], energy = loss, after
+    result[0, steps], result[1, steps] = energy, state_at(energy, battery)[0]
+    return result
+
+
 @compiled()
 def states(energy: Array, battery: BatteryArrays) -> Array:
     """(4, n) SOC, open-circuit voltage, discharge and charge resistance at many stored energies."""

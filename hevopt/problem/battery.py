@@ -211,14 +211,15 @@ def step_flows(
     before_j, after_j: (time,) stored energy; the chemical power is what it falls by, so that the loss can be held
     against it
     """
-    _, voltage, discharge, charge = states(battery, before_j)
-    resistance = np.where(power_w < 0, charge, discharge)
-    current = source_power_w(power_w, voltage, resistance)[0] / voltage
-    coulombic = (1 - battery.coulombic_efficiency) * np.maximum(-voltage * current, 0.0)
+    from hevopt.problem import _battery_kernels as kernels
+
+    before_j = np.ascontiguousarray(before_j, dtype=np.float64)
+    power_w = np.ascontiguousarray(power_w, dtype=np.float64)
+    loss, voltage, current = kernels.currents(before_j, power_w, battery.arrays)
     return {
         "battery_chemical_w": (before_j - after_j) / step_s,
-        "battery_loss_w": resistance * current**2 + coulombic,
-        "battery_voltage_v": voltage - resistance * current,
+        "battery_loss_w": loss,
+        "battery_voltage_v": voltage,
         "battery_current_a": current,
     }
 

@@ -76,7 +76,7 @@ class Memory(NamedTuple):
     energy_j: float
 
 
-@compiled()
+@compiled(bare=True)
 def _switchable(switching: Switching, case: int, mode: int) -> tuple[float, float]:
     """Most stored energy that a switch from a mode takes, and least, below 0 where it gives back."""
     most, least = 0.0, 0.0
@@ -87,7 +87,7 @@ def _switchable(switching: Switching, case: int, mode: int) -> tuple[float, floa
     return most, least
 
 
-@compiled()
+@compiled(bare=True)
 def decide(
     choices: Choices, k: int, state: State, value: Array, grid: SteadyGrid, battery: BatteryArrays
 ) -> tuple[int, State]:
@@ -140,7 +140,7 @@ def decide(
     return entry, State(next_mode, next_energy)
 
 
-@compiled()
+@compiled(bare=True)
 def neutral_factor(
     choices: Choices,
     drain: Array,
@@ -170,7 +170,7 @@ def neutral_factor(
     return 0.5 * (low + high)
 
 
-@compiled()
+@compiled(bare=True)
 def _factor(
     p: Feedback,
     base: float,
@@ -187,13 +187,13 @@ def _factor(
     return max(factor * min(max((high - energy) / edge_j, 0.0), 1.0), 0.0)
 
 
-@compiled()
+@compiled(bare=True)
 def regained(recovered: float, braking: bool, before: float, after: float) -> float:
     """Energy recovered so far, with what a step that braked has stored, given the charge before it and after."""
     return recovered + max(after - before, 0.0) if braking else recovered
 
 
-@compiled()
+@compiled(bare=True)
 def adaptive(
     choices: Choices,
     k: int,
@@ -204,9 +204,11 @@ def adaptive(
     window: tuple[float, float],
     p: Feedback,
     battery: BatteryArrays,
+    value: Array,
 ) -> tuple[int, float, Memory]:
     """Entry of step k, the factor that it is taken under, and what is remembered from then on.
 
+    value: (mode, 2) room
     memory: that of the step before, k - 1 where a window of past steps is looked at, else whichever it was
     """
     drain, step_s, speed, braking = view
@@ -231,13 +233,12 @@ def adaptive(
     integral += shortage * step_s[k] / p.integral_s
     integral = min(max(integral, -p.integral_max), p.integral_max)
     factor = _factor(p, base, shortage, integral, energy, window)
-    value = np.zeros((choices.first.shape[1] - 1, 2))
-    value[:, 1] = -factor * (high - low)
     # A switch pays its share at once: the rest of it is handed back.
     later, case = 1.0 - p.start_share, choices.switching.case[k]
     for n in range(len(value)):
-        paid_kg = choices.switching.kg[case, state.mode, n]
-        value[n] -= later * (paid_kg + factor * choices.switching.energy_j[case, state.mode, n])
+        switched_kg = factor * choices.switching.energy_j[case, state.mode, n]
+        handed_kg = later * (choices.switching.kg[case, state.mode, n] + switched_kg)
+        value[n, 0], value[n, 1] = -handed_kg, -factor * (high - low) - handed_kg
     entry, _ = decide(choices, k, state, value, SteadyGrid(low, high - low), battery)
     seen = Memory(recovered, slowed, base, integral, since, oldest, span_s, k, energy)
     return entry, factor, seen

@@ -87,6 +87,7 @@ class AdaptiveFactor:
         self.view = kernels.View(drain_j, length_s, *_speed_and_braking(problem))
         self.battery = problem.battery.arrays
         self.factor_kgpj = np.zeros(choices.steps)
+        self._room = np.zeros((choices.modes, 2))
         weight_v2 = settings.recovered_weight_v2
         self.memory = kernels.Memory(
             settings.recovered_jpv2 * weight_v2, weight_v2, settings.base_kgpj, 0.0, 0.0, 0, 0.0,
@@ -97,7 +98,7 @@ class AdaptiveFactor:
         """Index of the control of least equivalent cost at step k."""
         entry, self.factor_kgpj[k], self.memory = kernels.adaptive(
             self.choices, k, State(mode, energy_j), self.view, self.memory,
-            self.problem.end_min_j, self.problem.window_j, self.settings, self.battery,
+            self.problem.end_min_j, self.problem.window_j, self.settings, self.battery, self._room,
         )  # fmt: skip
         require_entry(self.problem, entry, k, "a_ecms")
         return int(self.choices.control[entry])

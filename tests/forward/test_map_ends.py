@@ -5,6 +5,7 @@ import pytest
 
 from hevopt import load_architecture
 from hevopt.forward._limits_kernels import by_map
+from hevopt.forward.burning import burnt_kgps
 from hevopt.forward.limits import limits_of
 from hevopt.forward.map_ends import within_map
 
@@ -22,10 +23,11 @@ def test_drag_at_idle_speed_is_the_maps(name):
 
 
 def read(engine, torque_nm, *side_radps):
-    torque, speed = within_map(
-        engine, np.array([torque_nm]), np.array(side_radps), np.array([True])
-    )
-    return torque[0], speed[0]
+    begins, ends = side_radps
+    found = within_map(engine, np.array([torque_nm]), np.array([begins]), np.array([ends]))
+    burnt = burnt_kgps(engine, found.torque_nm, found.speed_radps)
+    assert np.array_equal([found.fuel_kgps, found.nox_kgps], burnt, equal_nan=True)
+    return found.torque_nm[0], found.speed_radps[0]
 
 
 def test_a_step_that_begins_or_ends_in_the_map_counts_at_its_end():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hevopt import load_architecture
-from hevopt.forward.quality import drive_quality, violations
+from hevopt.forward.quality import _highest, drive_quality, violations
 
 TIME_S = np.arange(0.0, 60.05, 0.1)
 
@@ -94,3 +94,10 @@ def test_the_tolerance_follows_the_highest_and_lowest_of_two_seconds():
 def test_a_wanted_trace_that_stands_still_has_no_ratings(vehicle):
     quality = drive_quality(vehicle, TIME_S, 0 * TIME_S, 0 * TIME_S)
     assert np.isnan(quality.energy_percent) and quality.violations == ()
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 21])
+def test_the_highest_of_neighbours_is_found_by_halves(count):
+    values = np.random.default_rng(count).uniform(size=40)
+    brute = [values[first : first + count].max() for first in range(40 - count + 1)]
+    assert _highest(values, count).tolist() == brute
