@@ -31,7 +31,7 @@ HALVINGS = 30
 _NOTHING = 1e-12
 # Share of its highest torque by which a governor pushes the engine faster or slower beyond holding it.
 _PUSH = 0.1
-# Share of the governor's highest speed up to which the engine turns it.
+# Share of the governor's highest speed up to which the engine turns it, and of its own; beyond it has no torque.
 _NEARLY = 0.999
 
 
@@ -100,25 +100,28 @@ def _clip(value: float, low: float, high: float) -> float:
 
 @compiled(bare=True)
 def side_after(
-    car: FreeCar, course: FreeCourse, now: Now, phase: int, wheel: float, step_s: float, more: float
-) -> float:
-    """The engine's speed after a step, at the end of which wheels turn at a speed.
+    car: FreeCar, course: FreeCourse, now: Now, phase: int, wheel: float, ahead: float, step_s: float, more: float
+) -> float:  # fmt: skip
+    """The engine's speed after a step; wheel, ahead: speed of the wheels now, and as asked for at its end.
 
-    A first-order lag behind the planned one, times `more`, or the clutch's, within the governor's highest speed; or
-    as it is started or stopped.
+    A first-order lag behind the planned one, times `more`, or the clutch's, within its own highest speed and the
+    governor's, whether the wheels get as fast as asked or not; or as it is started or stopped.
     """
     limits, driver, n, ways = car.loop.limits, car.loop.driver, now.side_radps, car.loop.ways
     idle = limits.idle_radps
     if phase == motor.TURNING:
         target = more * course.engine_radps[now.step]
         if course.closed[now.step]:
-            target = ways.wheel[0, len(ways.inertia_kgm2) - 1] * wheel
-        target = min(max(target, idle), limits.engine_max_radps)
+            target = ways.wheel[0, len(ways.inertia_kgm2) - 1] * ahead
+        target = min(max(target, idle), _NEARLY * limits.engine_max_radps)
         after = n + (1.0 - np.exp(-step_s / driver.governor_s)) * (target - n)
         top = _NEARLY * car.motors.top_radps[car.governor]
-        own, per = ways.wheel[0, car.governor + 1] * wheel, ways.side[0, car.governor + 1]
-        ends = (-top - own) / per, (top - own) / per
-        return float(max(min(max(after, min(ends)), max(ends)), idle))
+        low, high, per = -np.inf, np.inf, ways.side[0, car.governor + 1]
+        for speed in (wheel, ahead):
+            own = ways.wheel[0, car.governor + 1] * speed
+            ends = (-top - own) / per, (top - own) / per
+            low, high = max(low, min(ends)), min(high, max(ends))
+        return float(max(min(max(after, low), high), idle))
     if phase == motor.STARTING:
         return max(min(n + idle / driver.start_s * step_s, idle), min(n, idle))
     return max(n - idle / driver.stop_s * step_s, 0.0)

@@ -146,7 +146,7 @@ def _wish(
     # What full load cannot give of the charge that lacks a higher speed gives.
     beyond = max(planned - max(gives.most_nm, course.engine_nm[now.step]), 0.0)
     more = min(1.0 + beyond / max(gives.most_nm, 1.0), _FASTER)
-    side_accel = side_after(car, course, now, phase, ahead, step_s, more) - now.side_radps
+    side_accel = side_after(car, course, now, phase, wheel, ahead, step_s, more) - now.side_radps
     side_accel /= step_s
     load_w = task.load_w[0 if phase == motor.REST else 1, now.k]
     if phase == motor.STARTING:

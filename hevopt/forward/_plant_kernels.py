@@ -57,7 +57,7 @@ def step(
     variant = state.variant
     guess_wheel, guess_side, guess_nm = 0.0, 0.0, state.lost_nm
     rest = motion
-    for _ in range(_ROUNDS):
+    for n in range(_ROUNDS):
         lost = guess_nm
         row = row_of(
             ways, rows, state, inputs, variant, moving, wheel, guess_wheel, guess_side, row
@@ -81,7 +81,9 @@ def step(
         still = abs(solved.wheel - guess_wheel) <= SETTLED * wheel
         still &= abs(solved.side - guess_side) <= SETTLED * state.side_radps
         still |= not (moving or flows)
-        if found == variant and still and abs(guess_nm - lost) <= SETTLED * max(lost, 1.0):
+        still &= found == variant and abs(guess_nm - lost) <= SETTLED * max(lost, 1.0)
+        # Where the teeth turn as one no direction proves right: the last one tried is that of the solution.
+        if still or n == _ROUNDS - 1:
             break
         variant, guess_wheel, guess_side = found, solved.wheel, solved.side
 

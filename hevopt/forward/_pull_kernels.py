@@ -43,13 +43,15 @@ _HELD_SHARE = 0.95
 class Foot(NamedTuple):
     """How the pedal is floored.
 
-    launch_radps, up_radps: engine speed held in the launch, and of a change up; boosts: whether the machine helps
+    launch_radps, up_radps: engine speed held in the launch, and of a change up at the latest
+    up_mps: (gear,) speed of the car of a change up; boosts: whether the machine helps
     fills: whether it adds no more than what the engine lacks of its steady full load
     lag_s, natural_share: full load comes as  s0 + (1 - s0)(1 - exp(-t / lag))  with the pedal; 0 for at once
     """
 
     launch_radps: float
     up_radps: float
+    up_mps: Array
     boosts: bool
     fills: bool
     lag_s: float
@@ -151,7 +153,10 @@ def after_pull(
     wheel, n = wheel_radps(state.speed_mps, state.spin_radps, car.body), state.side_radps
     flows = len(car.ways.fluid.locks) > 0
     ready = lever.blend == 0.0 if flows else closing == 1.0 and not launches
-    if n >= foot.up_radps and gear + 1 < len(by_gear) and ready:
+    # A clutch that closes may still slip, so that the gears' speed decides; before a torque converter the engine's.
+    turns = n if flows else car.ways.wheel[by_gear[gear], output] * wheel
+    fast = turns >= foot.up_radps or state.speed_mps >= foot.up_mps[gear]
+    if fast and gear + 1 < len(by_gear) and ready:
         gear, closing = gear + 1, 0.0
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     machine += car.ways.side[lever.way, 1] * n

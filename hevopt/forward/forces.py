@@ -19,6 +19,8 @@ from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS, STANDARD_GRAVITY_MPS2
 LAUNCH_RPM = 1800.0
 # Speeds of the engine between which it meets a torque converter.
 _STALLS = 600
+# Share within which ratios are the same.
+_ALIKE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,7 +53,7 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
     speed = np.linspace(0.1, 300 / KMH_PER_MPS, 1200)
     wheel = speed / radius
     forces = []
-    launch = 0.0 if car.electric else LAUNCH_RPM / RPM_PER_RADPS
+    launch, highest = 0.0 if car.electric else LAUNCH_RPM / RPM_PER_RADPS, highest_radps(car, line)
     for way in by_gear(line):
         ratio = ways.wheel[way, -1]
         side = np.maximum(ratio * wheel, launch if way == 0 else 0.0)
@@ -68,11 +70,46 @@ def forces_of(car: Architecture, line: Line, driven: LoopCar, boosts: bool) -> C
             through = load[-1] * on_side + load[1:-1] @ machines
             lost = lost_at(car, line.keys[way][0], ratio * wheel, through)
             torque -= ratio * ways.wheel_yield[way, 0, -1] * lost
-        known = (side >= limits.idle_radps) & (side <= limits.engine_max_radps)
+        known = (side >= limits.idle_radps) & (side <= highest)
         forces.append(np.where(known, torque / radius, np.nan))
     tyre = driven.body.tyre
     grip = tyre.friction * tyre.driven_share * car.vehicle.mass_kg * STANDARD_GRAVITY_MPS2
     return Curves(speed, np.array(forces), resistance_n(driven, speed), float(grip))
+
+
+def highest_radps(car: Architecture, line: Line) -> float:
+    """Highest speed of the engine, or of a machine that turns with it in every gear, there."""
+    highest, ways, places = car.engine.speed_max_radps, line.ways, by_gear(line)
+    if len(places) == 1:
+        return highest
+    per = ways.wheel[places, 1:-1] / ways.wheel[places, -1:] + ways.side[places, 1:-1]
+    for unit, machine in enumerate(line.order):
+        if np.ptp(per[:, unit]) < _ALIKE * abs(per[0, unit]):
+            highest = min(highest, car.machines[machine].speed_max_radps / abs(per[0, unit]))
+    return float(highest)
+
+
+def change_up_mps(car: Architecture, line: Line, driven: LoopCar, curves: Curves) -> Array:
+    """(gear,) speed of the car from which on the next gear accelerates it more than this one; infinite without one.
+
+    The time from one speed to another is ∫ dv/a, so that no other changes take less of it, but for their gaps. What
+    turns with a gear is part of the mass that it accelerates.
+    """
+    ways, radius = line.ways, car.vehicle.tyre_radius_m
+    accel = np.nan_to_num(curves.by_gear_n, nan=-np.inf) - curves.resistance_n
+    for place, way in enumerate(by_gear(line)):
+        to_side = ways.wheel[way, -1] * ways.side[way, :-1]
+        rate, yields = ways.wheel[way, :-1] + to_side, ways.wheel_yield[way, 0]
+        per_nm = ways.wheel[way, :-1] * yields[:-1] + to_side * yields[-1]
+        turning_kg = float(np.sum(ways.inertia_kgm2[:-1] * rate * per_nm)) / radius**2
+        accel[place] /= car.vehicle.equivalent_mass_kg + turning_kg
+    found = np.full(len(accel), np.inf)
+    for place in range(len(accel) - 1):
+        better = np.flatnonzero((accel[place] >= accel[place + 1]) & np.isfinite(accel[place]))
+        after = int(better[-1]) + 1 if len(better) else 0
+        if after < len(curves.speed_mps) and np.isfinite(accel[place, after]):
+            found[place] = curves.speed_mps[after]
+    return found
 
 
 def resistance_n(driven: LoopCar, speed_mps: Array) -> Array:

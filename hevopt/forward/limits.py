@@ -20,6 +20,8 @@ _TORQUES = 201
 _LOADS = 33
 # Beyond its highest speed by this share an engine is not tabulated, and neither is a machine.
 _BEYOND = 1.2
+# Share of its highest speed up to which a machine beside a free engine speed keeps what torque it has there [E].
+_A_LITTLE = 1.02
 # Steps of a table of the braking that a machine may take: speed, and braking force over weight.
 _BRAKING_MPS, _BRAKING_RATE = 0.25, 0.01
 # Speeds at a time for which torques that battery and machine allow are searched: what memory close by holds.
@@ -88,9 +90,11 @@ def motors_of(car: Architecture) -> Motors:
     """The limits of every machine of a car, and of its battery."""
     tables = [_tabulated(machine) for machine in car.machines]
     speeds, most, losses = (list(parts) for parts in zip(*tables, strict=True))
+    # One that a step takes a little beyond its highest speed still brakes itself and the engine.
     limits = [
-        np.where(speed <= machine.speed_max_radps, machine.limit_nm(speed), 0.0)
+        np.where(speed <= _A_LITTLE * top, machine.limit_nm(np.minimum(speed, top)), 0.0)
         for machine, speed in zip(car.machines, speeds, strict=True)
+        for top in (machine.speed_max_radps,)
     ]
     least_w, most_w = power_limits_w(car.battery)
     top = np.array([machine.speed_max_radps for machine in car.machines])

@@ -19,23 +19,24 @@ from hevopt.forward.forces import (
     LAUNCH_RPM,
     Curves,
     by_gear,
+    change_up_mps,
     forces_of,
+    highest_radps,
     slope_at,
     start_slope,
     tabulated,
     top_mps,
 )
 from hevopt.forward.free_pull import FreePull, check_steady_pull
-from hevopt.forward.lines import line_of
+from hevopt.forward.lines import Line, line_of
 from hevopt.forward.run import loop_car, shifting_of
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import energy_j
 from hevopt.units import KMH_PER_MPS, RPM_PER_RADPS
 
 STEP_S = 0.01
-UP_RPM = 4200.0
-# Of an engine that does not turn that fast, the share of its highest speed [E].
-_UP_SHARE = 0.97
+# How far below its highest speed an engine is changed up at the latest: twice what a step gains in first gear [E].
+_UP_BELOW_RADPS = 4.0
 SPEEDS_KMH = tuple(range(20, 161, 20))
 DISTANCES_M = (400.0, 1000.0)
 IN_GEAR_KMH = ((60, 100), (80, 120))
@@ -129,17 +130,17 @@ def performance(
     loaded, line = car.of_mass(car.vehicle.mass_kg + added_kg), line_of(car)
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
     driven = loop_car(loaded, line, handling._replace(shifting=shifting))
-    foot = _foot(car, boosts, fills, boost_lag_s)
     start_j = float(energy_j(car.battery, car.soc_start))
     free = FreePull(loaded, line, driven, boosts) if line.free else None
-    floored = _Floored(loaded, driven, by_gear(line), foot, start_j, engine_model, free)
-    trace = _pulled(floored, 0.0, 0, max(SPEEDS_KMH), max(DISTANCES_M))
     curves, engine = (
         free.curves(helps) if free else forces_of(loaded, line, driven, helps)
         for helps in (boosts or car.electric, car.electric)
     )  # fmt: skip
-    in_gear = _in_gear(floored)
-    used, helps = _to_100_j(trace, start_j), boosts or fills
+    up_mps = np.full(1, np.inf) if free else change_up_mps(loaded, line, driven, curves)
+    foot, ways = _foot(car, line, boosts, fills, boost_lag_s, up_mps), by_gear(line)
+    floored = _Floored(loaded, driven, ways, foot, start_j, engine_model, free)
+    trace = _pulled(floored, 0.0, 0, max(SPEEDS_KMH), max(DISTANCES_M))
+    in_gear, used, helps = _in_gear(floored), _to_100_j(trace, start_j), boosts or fills
     return Performance(
         loaded,
         helps,
@@ -150,7 +151,7 @@ def performance(
         start_slope(loaded, driven, handling, curves),
         {kmh: slope_at(loaded, curves, kmh / KMH_PER_MPS, handling) for kmh in SUSTAINED_KMH},
         used,
-        _repeats(car, start_j, used) if (helps or car.electric) and used else None,
+        _window_j(car, start_j) / used if (helps or car.electric) and used else None,
         curves,
         trace,
         {case: None if at is None else at[1] for case, at in in_gear.items()},
@@ -159,15 +160,15 @@ def performance(
     )
 
 
-def _foot(car: Architecture, boosts: bool, fills: bool, boost_lag_s: float) -> Foot:
+def _foot(
+    car: Architecture, line: Line, boosts: bool, fills: bool, boost_lag_s: float, up_mps: Array
+) -> Foot:
     """The pedal floored; a car without an engine launches and changes up at no speed of it, all by its machine."""
     check_steady_pull(car, fills, boost_lag_s)
-    up = min(UP_RPM, _UP_SHARE * RPM_PER_RADPS * car.engine.speed_max_radps)
-    launch, up = (0.0, np.inf) if car.electric else (LAUNCH_RPM, up)
+    up = np.inf if car.electric or line.free else highest_radps(car, line) - _UP_BELOW_RADPS
+    launch = 0.0 if car.electric else LAUNCH_RPM / RPM_PER_RADPS
     helps = boosts or fills or car.electric
-    return Foot(
-        launch / RPM_PER_RADPS, up / RPM_PER_RADPS, helps, fills, float(boost_lag_s), _NATURAL_SHARE
-    )
+    return Foot(launch, float(up), up_mps, helps, fills, float(boost_lag_s), _NATURAL_SHARE)
 
 
 def _check(
@@ -241,9 +242,8 @@ def _to_100_j(trace: Array, start_j: float) -> float | None:
     return None if to_100 is None else start_j - _stored_j(trace, to_100)
 
 
-def _repeats(car: Architecture, start_j: float, used_j: float) -> float:
-    """How often an energy is there above the window's lower end."""
-    return (start_j - float(energy_j(car.battery, car.battery.soc_min))) / used_j
+def _window_j(car: Architecture, start_j: float) -> float:
+    return start_j - float(energy_j(car.battery, car.battery.soc_min))
 
 
 def _stored_j(trace: Array, at_s: float) -> float:
@@ -279,7 +279,8 @@ def _in_gear(floored: _Floored) -> dict[tuple[int, int, int], tuple[float, float
     not reached.
     """
     driven, ways = floored.driven, floored.ways
-    held = floored._replace(foot=floored.foot._replace(up_radps=np.inf))
+    never = np.full_like(floored.foot.up_mps, np.inf)
+    held = floored._replace(foot=floored.foot._replace(up_radps=np.inf, up_mps=never))
     lowest = 1 if floored.car.electric or floored.free is not None else 3
     cases = [(gear, *pair) for gear in range(lowest, len(ways) + 1) for pair in IN_GEAR_KMH]
     if len(ways) >= 4:

@@ -82,7 +82,9 @@ def floored(name, **help_):
     car = load_architecture(name)
     line = line_of(car)
     driven_ = loop_car(car, line, car.handling._replace(shifting=shifting_of(car)))
-    foot = pulling.Foot(188.5, 440.0, bool(help_), help_.get("fills", False), 0.0, 0.45)
+    foot = pulling.Foot(
+        188.5, 440.0, np.full(6, np.inf), bool(help_), help_.get("fills", False), 0.0, 0.45
+    )
     start_j = float(energy_j(car.battery, car.soc_start))
     return _Floored(car, driven_, by_gear(line), foot, start_j, "mean_value", None)
 

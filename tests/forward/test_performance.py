@@ -7,6 +7,8 @@ import pytest
 
 from hevopt import DataError, load_architecture, performance
 from hevopt.car.handling import Handling, Shifting, Tyre
+from hevopt.files.lookup import groups_of, shipped_names
+from hevopt.forward import performance as floored
 
 
 @cache
@@ -31,6 +33,51 @@ def test_e_boost_is_faster_everywhere_and_takes_its_energy_from_the_battery(name
         assert time < alone.in_gear_s[case]
     assert 50e3 < boosted.to_100_j < 400e3 and 2 < boosted.repeats < 20
     assert boosted.top_mps == pytest.approx(alone.top_mps, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "name", [*shipped_names("architectures", ".toml"), *groups_of("architectures", ".toml")["hybrids"],
+             *groups_of("architectures", ".toml")["real"]],
+)  # fmt: skip
+def test_every_shipped_car_is_plausible_and_no_slower_with_its_machine(name):
+    car, found = load_architecture(name), figures(name)
+    times = [time for time in found.to_speed_s.values() if time is not None]
+    # Without its battery a car whose engine has a speed of its own has what the generator gives.
+    slowest = 30 if car.driveline.free_engine_speed else 17
+    assert len(times) >= 7 and times == sorted(times) and 6 < found.to_speed_s[100] < slowest
+    assert 130 < 3.6 * max(found.top_mps.values()) < 260 and 0.2 < found.start_slope < 0.44
+    if not (car.electric or car.driveline.free_engine_speed):
+        changes = np.flatnonzero(np.diff(found.trace[:, 2]))
+        assert len(changes) > 1 and np.diff(found.trace[changes, 0]).min() > 3, (
+            "a change for each gear"
+        )
+    if "e_boost" in car.functions:
+        boosted = figures(name, boosts=True)
+        for kmh, time in found.to_speed_s.items():
+            assert time is None or boosted.to_speed_s[kmh] <= time + 1e-6, kmh
+        for case, time in found.in_gear_s.items():
+            assert time is None or boosted.in_gear_s[case] <= time + 1e-6, case
+
+
+def test_a_petrol_car_is_as_fast_as_the_real_one():
+    """Car and Driver measured 7.9 s to 60 mph, by thetruthaboutcars.com of 2017-09-21."""
+    trace = figures("camry_2018").trace
+    to_60_mph = 0.01 * int(np.argmax(trace[:, 0] >= 26.82))
+    assert to_60_mph == pytest.approx(7.9, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "boosts"), [("A", False), ("C2", True), ("E", False)])
+def test_no_other_changes_up_are_faster(name, boosts, monkeypatch):
+    """Without gaps, the changes are those of the greatest acceleration: sooner or later costs time."""
+    quick = Handling(shifting=Shifting(gap_s=0.0))
+    car, at_once = load_architecture(name), floored.change_up_mps
+    times = {}
+    for factor in (0.85, 0.95, 1.0, 1.05, 1.15):
+        monkeypatch.setattr(floored, "change_up_mps", lambda *of, x=factor: x * at_once(*of))
+        found = performance(car, boosts=boosts, handling=quick)
+        times[factor] = found.to_distance[1000.0][0]
+    assert times[1.0] <= min(times.values()) + 0.02
+    assert times[0.85] > times[1.0] + 0.1
 
 
 def test_a_car_without_an_engine_is_as_fast_as_its_machine_and_grip_let_it():
