@@ -107,7 +107,9 @@ class Decider:
             wanted += ["engine_speed_radps", "engine_torque_nm"]
         # (row, control, flow)
         self._wanted = np.moveaxis(flows.several(wanted)[:, :, columns], 0, -1)
-        self._turning = turning_modes(problem)
+        self._turning: list[bool] = turning_modes(problem).tolist()
+        self._modes: list[int] = table.mode.tolist()
+        self._rows = len(table.step_s)
         on = np.array([state.engine_on for state in self._states])
         self._keeps: list[Flags] = [
             np.asarray(table.feasible[:, on == turns].any(axis=1)) for turns in (False, True)
@@ -117,9 +119,9 @@ class Decider:
     def decide(self, at_s: float, k: int, gear: int, look: col.Look, energy_j: float) -> Decision:
         """The command from a time on, in step k of the cycle and a gear; look: what the driver asks for."""
         row = k if self.points is None else self.points.row(gear, *look)
-        turns = bool(self._turning[self._mode])
+        turns = self._turning[self._mode]
         held = self.points is not None and at_s - self._since_s < self.asking.dwell_s - 1e-9
-        asked = row + len(self.problem.table.step_s) if held and self._keeps[turns][row] else row
+        asked = row + self._rows if held and self._keeps[turns][row] else row
         try:
             control = self.stepper.decide(asked, energy_j, self._mode)
         except InfeasibleError as error:
@@ -128,7 +130,7 @@ class Decider:
                 f"{self.name}: no decision at t = {at_s:g} s, gear {gear}, {look.speed_mps:.2f} m/s, "
                 f"{look.wheel_nm:.0f} Nm at the wheels, SOC {charge:.4f}: {error}"
             ) from None
-        self._mode, state = int(self.problem.table.mode[control]), self._states[control]
+        self._mode, state = self._modes[control], self._states[control]
         if state.engine_on != turns:
             self._since_s = at_s
         wanted: list[float] = self._wanted[row, control].tolist()
@@ -208,8 +210,10 @@ class _Orders:
         if self._slips and d > 0 and _coasts(self._car, command, look):
             task.way[d], task.apart[d] = task.way[d - 1], 3
         task.engine_on[d] = command.engine_on
-        torques = [command.machines_nm[machine] for machine in self._order]
-        task.machine_nm[d], task.others_nm[d] = torques[0], torques[1:]
+        first, *others = self._order
+        task.machine_nm[d] = command.machines_nm[first]
+        for n, machine in enumerate(others):
+            task.others_nm[d, n] = command.machines_nm[machine]
         if course is not None:
             course.engine_radps[d], course.engine_nm[d] = command.engine_radps, command.engine_nm
             course.machine_nm[d], course.closed[d] = command.machines_nm, command.closed

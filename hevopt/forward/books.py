@@ -27,7 +27,7 @@ from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.late import Late
 
 # Steps for which a component is asked at once: what memory close by holds.
-_TOGETHER = 8192
+_TOGETHER = 16384
 _FLOWS = {
     "speed_mps": book.SPEED, "engine_torque_nm": book.ENGINE_NM, "engine_speed_radps": book.ENGINE_RADPS,
     "start_w": book.START, "stop_w": book.STOP, "engine_inertia_w": book.ENGINE_INERTIA,

@@ -39,6 +39,8 @@ the charge over the past window, within `window_reach` of the figure above. With
 the mean gap was 1.8 %, more than without, so it is off by default.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hevopt.bounds.prices import drain_at_j
@@ -47,6 +49,7 @@ from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.choices import State, choices_of, require_choices, require_entry
 from hevopt.problem.frozen import frozen
 from hevopt.problem.problem import MACHINE_EFFICIENCY, Plan, Problem
+from hevopt.problem.typed import typed
 from hevopt.strategies import _causal_kernels as kernels
 from hevopt.strategies.stepper import driven
 
@@ -85,9 +88,12 @@ class AdaptiveFactor:
         if interval_s is not None:
             length_s = frozen("interval_s", np.full(len(length_s), interval_s))
         self.view = kernels.View(drain_j, length_s, *_speed_and_braking(problem))
-        self.battery = problem.battery.arrays
         self.factor_kgpj = np.zeros(choices.steps)
-        self._room = np.zeros((choices.modes, 2))
+        self._adaptive: Callable[..., tuple[int, float, kernels.Memory]] | None = None
+        self._same = (
+            problem.end_min_j, problem.window_j, self.settings, problem.battery.arrays,
+            np.zeros((choices.modes, 2)),
+        )  # fmt: skip
         weight_v2 = settings.recovered_weight_v2
         self.memory = kernels.Memory(
             settings.recovered_jpv2 * weight_v2, weight_v2, settings.base_kgpj, 0.0, 0.0, 0, 0.0,
@@ -96,10 +102,14 @@ class AdaptiveFactor:
 
     def decide(self, k: int, energy_j: float, mode: int) -> int:
         """Index of the control of least equivalent cost at step k."""
-        entry, self.factor_kgpj[k], self.memory = kernels.adaptive(
-            self.choices, k, State(mode, energy_j), self.view, self.memory,
-            self.problem.end_min_j, self.problem.window_j, self.settings, self.battery, self._room,
-        )  # fmt: skip
+        at = State(mode, energy_j)
+        if self._adaptive is None:
+            self._adaptive = typed(
+                kernels.adaptive, self.choices, k, at, self.view, self.memory, *self._same
+            )
+        entry, self.factor_kgpj[k], self.memory = self._adaptive(
+            self.choices, k, at, self.view, self.memory, *self._same
+        )
         require_entry(self.problem, entry, k, "a_ecms")
         return int(self.choices.control[entry])
 
