@@ -58,7 +58,7 @@ def follow(
     progress = kernels.Course(
         np.full(steps, -1), np.empty(steps + 1), np.empty(steps + 1, dtype=np.int64),
         np.zeros(len(choices.cost_kg), dtype=bool), np.zeros(3, dtype=np.int64),
-        np.empty(len(choices.cost_kg)),
+        np.empty(len(choices.cost_kg)), np.empty(len(choices.cost_kg)),
     )  # fmt: skip
     battery = problem.battery.arrays
     progress.energy[0], progress.mode[0] = problem.start_j, problem.start_mode

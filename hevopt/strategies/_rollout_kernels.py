@@ -29,7 +29,7 @@ class Course(NamedTuple):
     """How far a rollout has come.
 
     path: (time,) entries; energy, mode: (time + 1,) before each step; closed: (entry,) dead ends
-    after: (entry,) room for stored energies after a step
+    after, total: (entry,) room for stored energies after a step, and for what it costs from there on
     at: [present step, furthest step, moves made]
     """
 
@@ -39,9 +39,10 @@ class Course(NamedTuple):
     closed: Flags
     at: Indices
     after: Array
+    total: Array
 
 
-@compiled()
+@compiled(bare=True)
 def _afters(
     low: int,
     high: int,
@@ -59,7 +60,47 @@ def _afters(
         left[i] = energy - step * chemical_power(some[i], voltage, discharge, charging, efficiency)
 
 
-@compiled()
+@compiled(bare=True)
+def _totals(
+    low: int,
+    high: int,
+    choices: Choices,
+    switch_kg: float,
+    ahead: Array,
+    grid: tuple[float, float],
+    inside: tuple[float, float],
+    progress: Course,
+) -> None:
+    """What a step costs with each of the entries low <= i < high and from there on, inf where it may not be taken,
+    several of them at a time.
+
+    ahead: (node,) cost-to-go after the step; grid: its lowest node and its cells; inside: where a step may end
+    """
+    cost, after, closed = (
+        choices.cost_kg[low:high],
+        progress.after[low:high],
+        progress.closed[low:high],
+    )
+    total, nodes = progress.total[low:high], len(ahead)
+    (low_j, cell_j), (least, greatest) = grid, inside
+    if nodes == 2:
+        for i in range(high - low):
+            share = (after[i] - low_j) / cell_j
+            to_go = ahead[0] * (1.0 - share) + ahead[1] * share
+            able = (not closed[i]) & (least <= after[i]) & (after[i] <= greatest)
+            total[i] = cost[i] + switch_kg + to_go if able else np.inf
+        return
+    for i in range(high - low):
+        total[i] = np.inf
+        if not closed[i] and least <= after[i] <= greatest:
+            place = (after[i] - low_j) / cell_j
+            j = min(max(int(np.floor(place)), 0), nodes - 2)
+            share = place - j
+            to_go = ahead[j] * (1.0 - share) + ahead[j + 1] * share
+            total[i] = cost[i] + switch_kg + to_go
+
+
+@compiled(bare=True)
 def _best_choice(
     choices: Choices,
     k: int,
@@ -73,7 +114,7 @@ def _best_choice(
 
     ahead: (mode, node) cost-to-go after the step
     """
-    first, modes, nodes = choices.first, choices.first.shape[1] - 1, ahead.shape[1]
+    first, modes = choices.first, choices.first.shape[1] - 1
     least, greatest, window = reach
     low, high = window
     slack = 1e-12 * abs(greatest[-1, 0])
@@ -93,19 +134,14 @@ def _best_choice(
         begin, end = first[k, n], first[k, n + 1]
         afters = progress.after
         _afters(begin, end, energy, state, choices.step_s[k], efficiency, choices.power_w, afters)
+        span = grid.low_j[k + 1], grid.cell_j
+        inside = least[k + 1, n] - slack, greatest[k + 1, n] + slack
+        switch_kg = switching.kg[case, mode, n]
+        _totals(begin, end, choices, switch_kg, ahead[n], span, inside, progress)
         for i in range(begin, end):
-            if progress.closed[i]:
-                continue
-            after = afters[i]
-            if not (least[k + 1, n] - slack <= after <= greatest[k + 1, n] + slack):
-                continue
-            place = (after - grid.low_j[k + 1]) / grid.cell_j
-            j = min(max(int(np.floor(place)), 0), nodes - 2)
-            share = place - j
-            to_go = ahead[n, j] * (1.0 - share) + ahead[n, j + 1] * share
-            total = choices.cost_kg[i] + switching.kg[case, mode, n] + to_go
-            if total < best:
-                best, chosen, chosen_mode, chosen_energy = total, i, n, after
+            if progress.total[i] < best:
+                best, chosen, chosen_mode = progress.total[i], i, n
+                chosen_energy = afters[i]
     return chosen, chosen_mode, chosen_energy
 
 
@@ -127,7 +163,7 @@ def rollout(
     entered and closed, so that with enough budget every path is tried.
     """
     first, end = choices.first, begin + len(value) - 1
-    path, energy, mode, closed, at, _ = progress
+    path, energy, mode, closed, at, _, _ = progress
     k, furthest, moves = at[0], at[1], at[2]
     while begin <= k < end and moves < budget:
         moves += 1

@@ -5,7 +5,8 @@ import pytest
 
 from hevopt import Battery, ControlTable, Problem, certify, simulate, solve
 from hevopt.problem.choices import choices_of
-from hevopt.strategies._rollout import _why_unreachable
+from hevopt.strategies._rollout import _why_unreachable, reach_of, roll
+from hevopt.strategies._rollout_kernels import Grid
 
 
 def charged_once(charge_ohm, asked: float, start: float = 0.0) -> Problem:
@@ -42,3 +43,28 @@ def test_what_is_said_where_no_path_is_found_does_not_contradict_itself():
     beyond = _why_unreachable(problem, choices, 1.01 * asked_j)
     assert "no path was found that keeps within the SOC window 0 to 1" in within
     assert "the most any plan" not in within and "the most any plan" in beyond
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_straight_value_on_two_nodes_or_many_is_followed_alike_round_dead_ends(seed):
+    rng = np.random.default_rng(seed)
+    shape = 30, 6
+    table = ControlTable.from_arrays(
+        rng.uniform(0.0, 1.0, shape),
+        rng.uniform(-2000.0, 2000.0, shape),
+        mode=rng.integers(0, 2, shape[1]),
+        switch_fuel_kg=np.array([[0.0, 0.2], [0.1, 0.0]]),
+    )
+    # A window of a few steps' energy, in which greed runs into dead ends.
+    problem = Problem(table, Battery([0, 1], [100, 100], [0, 0], [0, 0], 40.0), 0.5, 0.5)
+    choices, (low, high) = choices_of(problem), problem.window_j
+    reach = reach_of(problem, choices, problem.end_min_j)
+    followed = []
+    for nodes in (2, 5):
+        stored = np.linspace(low, high, nodes)
+        value = np.broadcast_to(-2e-4 * stored, (choices.steps + 1, choices.modes, nodes)).copy()
+        grid = Grid(np.full(choices.steps + 1, low), (high - low) / (nodes - 1))
+        followed.append(roll(problem, choices, reach, value, grid))
+    assert np.array_equal(followed[0][0], followed[1][0])
+    assert np.array_equal(followed[0][1], followed[1][1])
+    assert followed[0][1][-1] >= problem.end_min_j * (1 - 1e-12)
