@@ -137,9 +137,14 @@ def priced_rounding(problem: Problem, choices: Choices, price: Array, *, tangent
 def drain_magnitude_w(choices: Choices, inside: BatteryArrays, tangents: bool) -> Array:
     """(entry,) what the rounding of r is an epsilon of; with `tangents` also that of its slope over the window."""
     grown = battery_kernels.amplification(choices.power_w, inside)
-    lowest, highest = inside.open_circuit_v[0], inside.open_circuit_v[-1]
-    rise = (highest - lowest) * highest / lowest**2 if tangents else 0.0
-    return 2.0 * np.abs(choices.power_w) * (4.0 + grown + rise * np.minimum(grown, STEEPEST) ** 3)
+    magnitude = 4.0 + grown
+    if tangents:
+        lowest, highest = inside.open_circuit_v[0], inside.open_circuit_v[-1]
+        steep = np.minimum(grown, STEEPEST)
+        # A power of an array takes many times as long as the products.
+        magnitude += (highest - lowest) * highest / lowest**2 * (steep * steep * steep)
+    drain_w: Array = 2.0 * np.abs(choices.power_w) * magnitude
+    return drain_w
 
 
 def _greatest_switch_j(choices: Choices) -> Array:
