@@ -21,13 +21,11 @@ from hevopt._compile import compiled
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _rows_kernels as col
 from hevopt.forward._acting_kernels import LoopCar, Now
-from hevopt.forward._limits_kernels import Motors, electric_of, limit_nm, terminal_w
+from hevopt.forward._limits_kernels import Motors, electric_of, limit_nm, lowered, terminal_w
 from hevopt.forward._rows_kernels import Array
 from hevopt.forward._solve_kernels import SolvedStep, directions
 
 _TRIES = 4
-# Of a share of a torque, or of an acceleration, as far as the battery has power for it.
-HALVINGS = 30
 _NOTHING = 1e-12
 # Share of its highest torque by which a governor pushes the engine faster or slower beyond holding it.
 _PUSH = 0.1
@@ -160,15 +158,7 @@ def _within(car: FreeCar, wish: FreeWish, speeds: Array, machine_nm: Array) -> N
         drawn = rest + electric_of(motors, d, wanted, speeds[d])
         if sign * terminal_w(drawn, limits) <= end_w:
             continue
-        low, high = 0.0, 1.0
-        for _ in range(HALVINGS):
-            share = 0.5 * (low + high)
-            drawn = rest + electric_of(motors, d, share * wanted, speeds[d])
-            if sign * terminal_w(drawn, limits) <= end_w:
-                low = share
-            else:
-                high = share
-        machine_nm[d] = low * wanted
+        machine_nm[d] = lowered(motors, limits, d, wanted, speeds[d], rest, sign, end_w)
 
 
 @compiled(bare=True)

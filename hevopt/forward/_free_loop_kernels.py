@@ -21,8 +21,8 @@ from hevopt.forward._drive_kernels import (
     place_of,
     record_step,
 )
+from hevopt.forward._free_battery_kernels import held_back
 from hevopt.forward._free_kernels import (
-    HALVINGS,
     Allotted,
     FreeCar,
     FreeCourse,
@@ -32,7 +32,7 @@ from hevopt.forward._free_kernels import (
     may_not_rest,
     side_after,
 )
-from hevopt.forward._limits_kernels import by_map, limit_nm, terminal_w
+from hevopt.forward._limits_kernels import HALVINGS, by_map, limit_nm, terminal_w
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State
@@ -159,6 +159,8 @@ def _wish(
         engine = min(max(planned, least), most)
     elif turns:
         most = least
+    empty = now.energy_j <= car.loop.window_j[0] and phase != motor.STARTING
+    most_w = 0.0 if empty else car.motors.most_w
     wheel_nm = 0.0 if pedal.holds else pedal.force_n * body.radius_m
     wheel_nm += friction_nm(car.loop, wheel_nm, state.speed_mps)
     least_w = car.motors.least_w
@@ -167,7 +169,7 @@ def _wish(
     if not turns:
         engine = by_map(now.side_radps, limits).least_nm if side_accel < 0.0 else 0.0
     return FreeWish(wheel_nm, accel, side_accel, engine, least, most, turns, closing > 0.0,
-                pedal.holds, braking, least_w, car.motors.most_w, load_w)  # fmt: skip
+                pedal.holds, braking, least_w, most_w, load_w)  # fmt: skip
 
 
 @compiled(inline="always")
@@ -262,15 +264,21 @@ def after_step(
     given = allotted(car, work.rows, state.way, state.variant, wish, wheel, state.side_radps,
                      speeds, machine_nm)  # fmt: skip
     inputs = _inputs(car, loop, pedal, wish, given, closing, slope, machine_nm, step_s)
-    before = state.side_radps
-    state, out = _stepped(car, work, state, inputs, wish, speeds, pace)
-    mean_side = 0.5 * (before + state.side_radps)
-    _speeds(car, state.way, 0.5 * (wheel + state.speed_mps / body.radius_m), mean_side, speeds)
-    power = bus_w(car, machine_nm, speeds) + task.load_w[0 if phase == motor.REST else 1, k]
+    began, load_w, full = state, task.load_w[0 if phase == motor.REST else 1, k], given.full
+    for n in range(_ROUNDS):
+        state, out = _stepped(car, work, began, inputs, wish, speeds, pace)
+        mean_side = 0.5 * (began.side_radps + state.side_radps)
+        _speeds(car, state.way, 0.5 * (wheel + state.speed_mps / body.radius_m), mean_side, speeds)
+        starts_w = max(out.engine_nm * mean_side, 0.0) / limits.spin_efficiency
+        drawn_w = load_w + (starts_w if phase == motor.STARTING else 0.0)
+        if n == _ROUNDS - 1 or not held_back(car, wish, speeds, machine_nm, drawn_w):
+            break
+        full = not wish.braking
+    power = bus_w(car, machine_nm, speeds) + load_w
     energy = energy_after(car.loop, energy, power, phase, out, mean_side, step_s)
-    pedal = remembered(pedal, given.full and pedal.error_mps > 0.0, body, driver, step_s)
+    pedal = remembered(pedal, full and pedal.error_mps > 0.0, body, driver, step_s)
     cause = motor.CHANGE if closing > 0.0 else motor.NONE
-    record_step(row, state, pedal, energy, phase, cause, given.full, out, machine_nm)
+    record_step(row, state, pedal, energy, phase, cause, full, out, machine_nm)
     return FreeLoop(state, pedal, phase, closing, energy, ahead)
 
 

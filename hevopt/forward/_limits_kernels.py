@@ -9,6 +9,9 @@ from hevopt._compile import compiled
 
 Array = NDArray[np.float64]
 
+# Of a share of a torque, or of an acceleration, as far as the battery has power for it.
+HALVINGS = 30
+
 
 class Limits(NamedTuple):
     """Curves over speed, tabulated from the car's own components; what is burnt is judged by these, not here.
@@ -177,6 +180,22 @@ def terminal_w(bus_w: float, limits: Limits) -> float:
         return bus_w
     share = _between(limits.converter_w, limits.converter_share, abs(bus_w))
     return bus_w / share if bus_w > 0.0 else bus_w * share
+
+
+@compiled(bare=True)
+def lowered(
+    motors: Motors, limits: Limits, m: int, torque: float, speed: float, rest_w: float, sign: float, end_w: float
+) -> float:  # fmt: skip
+    """A machine's torque with which an end of the battery's power is kept beside what the rest draws."""
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        share = 0.5 * (low + high)
+        drawn = rest_w + electric_of(motors, m, share * torque, speed)
+        if sign * terminal_w(drawn, limits) <= end_w:
+            low = share
+        else:
+            high = share
+    return low * torque
 
 
 @compiled(bare=True)

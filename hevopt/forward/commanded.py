@@ -16,13 +16,13 @@ from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward._acting_kernels import LoopTask
 from hevopt.forward._pedal_kernels import PedalState
-from hevopt.forward.books import Books, books_of, within_top
+from hevopt.forward.books import Books, books_of
+from hevopt.forward.known import check_known
 from hevopt.forward.lines import line_of
 from hevopt.forward.loads import own_loads_w
 from hevopt.forward.loops import Driving, empty_course
 from hevopt.forward.run import (
     STEP_S,
-    check_charge,
     check_step,
     loop_car,
     starts_of,
@@ -34,6 +34,8 @@ from hevopt.problem.battery import energy_j, soc
 # A speed wanted, at which the loop's driver does not hold the car.
 _MOVES_MPS = 1.0
 _FASTEST_MPS = 100.0
+# Share of its highest speed up to which a machine is turned as the car begins.
+_NEARLY = 0.999
 # The loop's driver passes on what stands in his integral, and nothing of his own.
 _NO_GAINS = {
     "proportional": 0.0, "integral": 0.0, "derivative": 0.0, "feed_forward": 0.0, "preview_s": 0.0,
@@ -175,6 +177,7 @@ class CommandedCar:
         if loop is None:
             wanted = float(self._task.speed_mps[0])
             self._task.speed_mps[:] = self._speed_mps
+            self._begin_within()
             loop = self._driving.begun(before.stored_j)
             self._task.speed_mps[:] = wanted
         start = float(loop.state.speed_mps), float(loop.state.side_radps), before.stored_j
@@ -236,6 +239,20 @@ class CommandedCar:
             course.engine_nm[0] = commands.engine_nm
             course.machine_nm[0], course.closed[0] = torques, commands.clutch_closed
 
+    def _begin_within(self) -> None:
+        """The engine's speed as the car begins: no faster than the machine that keeps it may turn with it."""
+        line, course = self.line, self._course
+        if line.free is None or course is None:
+            return
+        governor = line.free.governor
+        top, per = (
+            _NEARLY * self.car.machines[governor].speed_max_radps,
+            line.ways.side[0, governor + 1],
+        )
+        own = line.ways.wheel[0, governor + 1] * self._speed_mps / self.car.vehicle.tyre_radius_m
+        ends = (-top - own) / per, (top - own) / per
+        course.engine_radps[0] = np.clip(course.engine_radps[0], min(ends), max(ends))
+
     def _way(self, commands: Commands) -> int:
         known = self.line.gears
         if commands.gear not in known:
@@ -258,7 +275,7 @@ class CommandedCar:
         books = books_of(self.car, self.line, record, start, self.step_s, self._task.load_w, before=before.row,
                          slips=self._slips)  # fmt: skip
         times: Array = self.step_s * np.arange(before.steps, before.steps + len(record) + 1.0)
-        _check_known(self.car, books, record, times)
+        check_known(self.car, books, record, times)
         was = motor.REST if before.row is None else int(before.row[col.PHASE])
         return books, starts_of(books.recorded.engine, was)
 
@@ -270,26 +287,3 @@ def _empty_task(car: Architecture) -> LoopTask:
         ever, np.zeros(2), np.zeros(1), loads_w, ever, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=bool),
         np.zeros(1, dtype=np.int64), np.zeros(1), np.zeros(2), np.zeros((1, len(car.machines) - 1)),
     )  # fmt: skip
-
-
-def _check_known(car: Architecture, books: Books, record: Array, time_s: Array) -> None:
-    """DataError where a measured map or the battery has ended, so that fuel or charge is not known."""
-    flows = books.flows
-    ended = {"engine": np.isnan(flows["fuel_power_w"] + flows["nox_kgps"])}
-    if np.isnan(flows["machine_loss_w"]).any():
-        for (name, _), machine in zip(car.driveline.machines, car.machines, strict=True):
-            speed = within_top(machine, flows[f"{name}_speed_radps"])
-            ended[name] = np.isnan(machine.loss_w(flows[f"{name}_torque_nm"], speed))
-    for name, unknown in ended.items():
-        torque, speed = flows[f"{name}_torque_nm"], flows[f"{name}_speed_radps"]
-        if (off := unknown & np.isfinite(torque) & np.isfinite(speed)).any():
-            n = int(np.argmax(off))
-            raise DataError(
-                f"{car.name}: the map of its {name} has no data at t = {time_s[n]:g} s, {speed[n]:.1f} rad/s and "
-                f"{torque[n]:.1f} Nm; ask for less or another gear, or extend the map"
-            )
-    check_charge(car, books, record, time_s)
-    if not (np.isfinite(record).all() and np.isfinite(books.energy_j).all()):
-        raise DataError(
-            f"{car.name}: more is asked at t = {time_s[0]:g} s than battery and machines can do; ask for less"
-        )

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from forward.commands import asked_on_the_hill
+from powertrain.test_source import written
 
 from hevopt import DataError, load_architecture
 from hevopt.commands.exporting import fmu as fmu_command
@@ -34,6 +35,8 @@ def units(tmp_path_factory):
     folder = tmp_path_factory.mktemp("units")
     for name in (*DRIVEN, "electric_compact"):
         export_fmu(load_architecture(name), folder / f"{name}.fmu", step_s=STEP_S)
+    cell = tmp_path_factory.mktemp("cell")
+    export_fmu(load_architecture(written(cell)), folder / "fuel_cell.fmu", step_s=STEP_S)
     return folder
 
 
@@ -155,9 +158,7 @@ def test_a_unit_is_valid_and_has_inputs_and_outputs_for_each_machine(units, name
     assert ("clutch_closed" in described) == (name == "series_parallel_1500")
 
 
-@pytest.mark.parametrize(
-    "name", [*(each for each in DRIVEN if each != "prius_1998"), "electric_compact"]
-)
+@pytest.mark.parametrize("name", [*DRIVEN, "electric_compact"])
 def test_full_force_and_full_brakes_are_driven_and_stay_finite(host, name):
     one = host(name)
     top = {"engine_speed_asked_radps": 300.0, "engine_torque_asked_nm": 1e4}
@@ -169,6 +170,20 @@ def test_full_force_and_full_brakes_are_driven_and_stay_finite(host, name):
         for variable in one.variables.values():
             assert np.isfinite(one.get(variable.name)), (k, variable.name)
     assert not one.logged and one.get("distance_m") > 50
+
+
+def test_a_fuel_cell_gives_the_power_that_is_asked_of_it(host):
+    one = host("fuel_cell")
+    assert "engine_speed_asked_radps" not in one.variables and "nox_kg" not in one.variables
+    assert one.variables["source_power_asked_w"].max == "45000.0"
+    one.set(force_asked_n=1000.0, source_power_asked_w=15e3)
+    for _ in range(60):
+        one.step()
+    # Fuel at 15 kW by its file.
+    assert one.get("fuel_kgps") == pytest.approx(0.208e-3, rel=1e-9) and one.get("speed_mps") > 3
+    one.set(source_power_asked_w=90e3)
+    one.step()
+    assert one.get("fuel_kgps") == pytest.approx(0.682e-3, rel=1e-6) and not one.logged
 
 
 @pytest.mark.parametrize("name", ["A", "prius_1998"])

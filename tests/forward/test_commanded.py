@@ -8,6 +8,7 @@ from forward.commands import asked_on_the_hill
 
 from hevopt import DataError, load_architecture
 from hevopt.forward.commanded import CommandedCar, Commands
+from hevopt.problem.battery import power_limits_w
 
 STEP_S = 0.1
 
@@ -130,3 +131,48 @@ def test_an_empty_battery_is_told():
     with pytest.raises(DataError, match="the battery is empty at t = "):
         for _ in range(100):
             one.advance(Commands(hold=True, engine_on=False), 100)
+
+
+@pytest.mark.parametrize("name", ["prius_1998", "prius_2016"])
+def test_a_battery_gives_no_more_than_it_has_however_much_is_asked(name):
+    """The engine is started on the way, as the generator would turn too fast beside one at rest."""
+    car = CommandedCar(load_architecture(name), step_s=0.1)
+    most_w, drawn_w = power_limits_w(car.car.battery)[1], []
+    for _ in range(200):
+        moved = car.advance(Commands(2e4, engine_on=False))
+        drawn_w.append(moved.books.flows["battery_power_w"][0])
+        assert max(abs(r[0]) for r in moved.books.residuals.values()) < 1e-6
+    assert max(drawn_w) < most_w * (1 + 1e-4) and drawn_w[100] > 0.9 * most_w
+    assert car.soc > car.car.battery.soc_min - 0.003 and car.speed_mps > 15 and moved.full
+
+
+def test_an_empty_window_leaves_the_machines_what_the_engine_gives():
+    car = CommandedCar(load_architecture("prius_2016"), step_s=0.1, soc_start=0.4)
+    for _ in range(20):
+        moved = car.advance(Commands(3000.0, engine_on=False))
+    assert car.speed_mps == 0 and moved.full
+    for _ in range(50):
+        car.advance(Commands(3000.0, engine_radps=200.0, engine_nm=80.0))
+    assert car.speed_mps > 1 and car.soc > 0.399
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "fault"),
+    [
+        ("prius_1998", Commands(clutch_open=True), "clutch_open True; prius_1998 has no such thing"),
+        ("prius_1998", Commands(clutch_closed=True), "clutch_closed True"),
+        ("prius_1998", Commands(machines_nm=(("machine", 5.0),)), "machine is asked for a torque; .* may be: none"),
+        ("C2", Commands(engine_radps=200.0), "engine_radps 200.0; C2 has no such thing"),
+        ("p0_p4_diesel", Commands(machines_nm=(("belt", 5.0),)), "may be: machine, machine_2"),
+    ],
+)  # fmt: skip
+def test_what_a_car_has_not_is_not_asked_of_it(name, asked, fault):
+    with pytest.raises(DataError, match=fault):
+        CommandedCar(load_architecture(name)).advance(asked)
+
+
+def test_an_engine_begins_no_faster_than_its_generator_may_turn():
+    car = CommandedCar(load_architecture("prius_1998"), step_s=0.1)
+    moved = car.advance(Commands(engine_radps=400.0, engine_nm=20.0))
+    top = car.car.machines[0].speed_max_radps
+    assert 0.9 * top < moved.books.flows["machine_speed_radps"][0] <= top
