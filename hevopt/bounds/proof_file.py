@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hevopt.bounds.certificate import Certificate, Proof
+from hevopt.bounds.certificate import Certificate
+from hevopt.bounds.claim import Proof
 from hevopt.bounds.lower_dp import slope_kgpj
 from hevopt.bounds.prices import EPSILON, bounded_choices
 from hevopt.bounds.step_prices import CELLS, STRAIGHT

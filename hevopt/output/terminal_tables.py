@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 from rich.table import Table
 from rich.text import Text
 
-from hevopt.bounds.certificate import PROOF_WORDS, SCOPE_WORDS
+from hevopt.bounds.claim import PROOF_WORDS, SCOPE_WORDS
 from hevopt.files.shown import printable
 from hevopt.output.tables import needed_width, titled_table
 from hevopt.studies.comparison import Comparison

@@ -4,7 +4,7 @@ import re
 
 from markupsafe import Markup, escape
 
-from hevopt.bounds.certificate import PROOF_WORDS
+from hevopt.bounds.claim import PROOF_WORDS
 
 WORDS = {
     "tabulated controls": "the torques, gears and clutches that the table of the car lists for each step, "

@@ -3,25 +3,12 @@
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from hevopt.errors import DataError, unknown_name
 from hevopt.problem.problem import Plan
-from hevopt.strategies import (
-    a_ecms,
-    baseline,
-    conventional,
-    convex,
-    dp,
-    ecms,
-    mpc,
-    nox_cut,
-    power_follower,
-    sdp,
-    start_stop,
-    thermostat,
-)
 from hevopt.strategies.brought import (
     FORMS,
     Elsewhere,
@@ -73,74 +60,100 @@ _RULE = "present step; its parameters are calibrated on the cycle"
 # Whether it holds the engine on comes from the steps before.
 _HYSTERESIS = "past and present; its parameters are calibrated on the cycle"
 
+
+class _Shipped:
+    """A function of a shipped strategy; its module, and the loops in it, are loaded when it is asked for."""
+
+    def __init__(self, strategy: str, function: str) -> None:
+        self._strategy, self._function = strategy, function
+
+    @property
+    def __wrapped__(self) -> Any:
+        return getattr(import_module(f"{__name__}.{self._strategy}"), self._function)
+
+    def __call__(self, *given: Any, **settings: Any) -> Any:
+        return self.__wrapped__(*given, **settings)
+
+
 STRATEGIES: dict[str, Strategy] = {
     "baseline": Strategy(
-        baseline.solve, "present step", _NONE, _STOP | _HYBRID, causal=True, start=baseline.start
+        _Shipped("baseline", "solve"),
+        "present step",
+        _NONE,
+        _STOP | _HYBRID,
+        causal=True,
+        start=_Shipped("baseline", "start"),
     ),
-    "start_stop": Strategy(start_stop.solve, _RULE, _STOP, _HYBRID, start=start_stop.start),
+    "start_stop": Strategy(
+        _Shipped("start_stop", "solve"),
+        _RULE,
+        _STOP,
+        _HYBRID,
+        start=_Shipped("start_stop", "start"),
+    ),
     "conventional": Strategy(
-        conventional.solve,
+        _Shipped("conventional", "solve"),
         _RULE,
         _HYBRID,
         _ELECTRIC,
-        start=conventional.start,
-        start_on=conventional.start_on,
+        start=_Shipped("conventional", "start"),
+        start_on=_Shipped("conventional", "start_on"),
     ),
     "nox_cut": Strategy(
-        nox_cut.solve,
+        _Shipped("nox_cut", "solve"),
         _RULE,
         _HYBRID | {"nox_cut"},
         _ELECTRIC,
-        start=nox_cut.start,
-        start_on=nox_cut.start_on,
+        start=_Shipped("nox_cut", "start"),
+        start_on=_Shipped("nox_cut", "start_on"),
     ),
     "power_follower": Strategy(
-        power_follower.solve,
+        _Shipped("power_follower", "solve"),
         _HYSTERESIS,
         _HYBRID | {"free_engine_speed"},
-        start=power_follower.start,
-        start_on=power_follower.start_on,
+        start=_Shipped("power_follower", "start"),
+        start_on=_Shipped("power_follower", "start_on"),
     ),
     "thermostat": Strategy(
-        thermostat.solve,
+        _Shipped("thermostat", "solve"),
         _HYSTERESIS,
         _HYBRID | {"series"},
-        start=thermostat.start,
-        start_on=thermostat.start_on,
+        start=_Shipped("thermostat", "start"),
+        start_on=_Shipped("thermostat", "start_on"),
     ),
-    "ecms": Strategy(ecms.solve, "whole cycle", _STOP),
-    "dp": Strategy(dp.solve, "whole cycle", _STOP),
-    "convex": Strategy(convex.solve, "whole cycle", _HYBRID, _ELECTRIC, usual=False),
+    "ecms": Strategy(_Shipped("ecms", "solve"), "whole cycle", _STOP),
+    "dp": Strategy(_Shipped("dp", "solve"), "whole cycle", _STOP),
+    "convex": Strategy(_Shipped("convex", "solve"), "whole cycle", _HYBRID, _ELECTRIC, usual=False),
     "mpc": Strategy(
-        mpc.solve,
+        _Shipped("mpc", "solve"),
         "20 s ahead, or --horizon",
         _HYBRID,
         _ELECTRIC,
         causal=True,
         usual=False,
         previews=True,
-        start=mpc.start,
+        start=_Shipped("mpc", "start"),
     ),
     "a_ecms": Strategy(
-        a_ecms.solve,
+        _Shipped("a_ecms", "solve"),
         "past and present",
         _HYBRID,
         _ELECTRIC,
         causal=True,
         usual=False,
-        start=a_ecms.start,
-        start_on=a_ecms.start_on,
+        start=_Shipped("a_ecms", "start"),
+        start_on=_Shipped("a_ecms", "start_on"),
     ),
     "sdp": Strategy(
-        sdp.solve,
+        _Shipped("sdp", "solve"),
         "past and present; other cycles",
         _HYBRID,
         _ELECTRIC,
         causal=True,
         usual=False,
         learns=True,
-        start=sdp.start,
-        start_on=sdp.start_on,
+        start=_Shipped("sdp", "start"),
+        start_on=_Shipped("sdp", "start_on"),
     ),
 }
 

@@ -27,7 +27,6 @@ from hevopt.errors import (
 )
 from hevopt.problem.arrays import Indices
 from hevopt.problem.problem import Plan, Problem
-from hevopt.problem.simulation import simulate
 from hevopt.strategies.causality import peeks
 from hevopt.strategies.policy import asked_of, asking
 from hevopt.strategies.stepper import driven
@@ -62,6 +61,8 @@ class Guarded(NamedTuple):
                 f"strategy {self.name} raised {type(error).__name__}: {_said(error)}{_place(error)}"
                 f"{self._hint(error)}"
             ) from error
+        from hevopt.problem.simulation import simulate
+
         plan = found.control if isinstance(found, Plan) else found
         if not isinstance(plan, list | tuple | np.ndarray):
             what = "nothing" if plan is None else f"a value of type {type(plan).__name__}"

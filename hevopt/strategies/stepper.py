@@ -9,7 +9,6 @@ from typing import Protocol
 import numpy as np
 
 from hevopt.display.facts import Shown
-from hevopt.problem._battery_kernels import chemical_power_at
 from hevopt.problem.arrays import Indices
 from hevopt.problem.problem import Problem
 from hevopt.problem.switching import at_step
@@ -51,6 +50,8 @@ def stepped(
     problem: Problem, k: int, energy_j: float, mode: int, control: int
 ) -> tuple[float, int]:
     """Stored energy and mode after a control at step k; energy_j, mode: those before it."""
+    from hevopt.problem._battery_kernels import chemical_power_at
+
     table, battery = problem.table, problem.battery.arrays
     after = int(table.mode[control])
     between_j = energy_j - float(at_step(table.switch_energy_j, k)[mode, after])

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.problem import Trajectory
-from hevopt.studies.case import Case
 from hevopt.studies.rows import Row
 from hevopt.units import KMH_PER_MPS
 
 if TYPE_CHECKING:
+    from hevopt.studies.case import Case
     from hevopt.studies.driven import DrivenPlan
 
 
@@ -48,7 +48,7 @@ class ForwardFigures(Shown):
 
 
 def forward_figures(
-    case: Case, row: Row, trajectory: Trajectory, horizon_s: float | None
+    case: "Case", row: Row, trajectory: Trajectory, horizon_s: float | None
 ) -> ForwardFigures:
     """A solved row of a case driven forward; what cannot be driven says so in its status."""
     # The forward plant: what drives nothing forward need not read it.

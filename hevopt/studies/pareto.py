@@ -20,7 +20,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite
 
-from hevopt.bounds.certificate import Claim, certify
+from hevopt.bounds.certificate import certify
+from hevopt.bounds.claim import Claim
 from hevopt.display.facts import Shown
 from hevopt.errors import DataError
 from hevopt.problem.problem import Plan, Problem

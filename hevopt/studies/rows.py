@@ -2,18 +2,20 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hevopt.bounds.certificate import Claim
+from hevopt.bounds.claim import Claim
 from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown
 from hevopt.errors import HevoptError
 from hevopt.files.shown import printable
 from hevopt.problem.problem import Problem, Trajectory
-from hevopt.studies.case import Case, litres
 from hevopt.studies.status import Mark, Status
+
+if TYPE_CHECKING:
+    from hevopt.studies.case import Case
 
 NEUTRAL_PERCENT = 1.0
 REFERENCE_ARCHITECTURE = "A"
@@ -81,8 +83,10 @@ class Row(Shown):
         return {f.name: getattr(self, f.name) for f in fields(self)} | texts
 
 
-def row_of(case: Case, strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
+def row_of(case: "Case", strategy: str, trajectory: Trajectory, solve_s: float) -> Row:
     """The row of what a strategy does on a case, no reference yet."""
+    from hevopt.studies.case import litres
+
     car, cycle, problem, certificate = case.car, case.cycle, case.problem, case.certificate
     fuel_kg, km = trajectory.total_fuel_kg, cycle.distance_m / 1e3
     surplus_j = trajectory.end_j - problem.end_min_j

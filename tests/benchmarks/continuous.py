@@ -22,7 +22,7 @@ if __name__ == "__main__":
 from between import Dense, dense_below
 
 from hevopt import load_architecture, load_cycle
-from hevopt.bounds.certificate import Scope
+from hevopt.bounds.claim import Scope
 from hevopt.driving.demand import Demand, demand_of
 from hevopt.driving.driver import change_down
 from hevopt.files.lookup import shipped_names

@@ -8,7 +8,7 @@ from conftest import HYBRIDS
 from problems import every_plan, random_problem
 
 from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
-from hevopt.bounds.certificate import Claim, Proof, Scope
+from hevopt.bounds.claim import Claim, Proof, Scope
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual, dual_of_shape, lp_dual

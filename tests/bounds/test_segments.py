@@ -6,7 +6,7 @@ from problems import every_plan, random_problem
 
 from hevopt import InfeasibleError, build_problem, certify, load_architecture, load_cycle, simulate
 from hevopt.bounds import certificate as certificate_module
-from hevopt.bounds.certificate import Proof
+from hevopt.bounds.claim import Proof
 from hevopt.bounds.segments import Segments, in_order, segment_dual
 from hevopt.bounds.step_prices import costate_dual
 from hevopt.strategies import dp

@@ -19,7 +19,7 @@ from hevopt import (
 )
 from hevopt.bounds import virtual
 from hevopt.bounds._virtual_kernels import among
-from hevopt.bounds.certificate import Proof, Scope
+from hevopt.bounds.claim import Proof, Scope
 from hevopt.errors import CoarseTableWarning
 from hevopt.problem.battery import chemical_power_w, states
 

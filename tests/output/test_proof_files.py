@@ -27,7 +27,7 @@ from hevopt import (
 )
 from hevopt.bounds import certificate as certificate_module
 from hevopt.bounds import virtual
-from hevopt.bounds.certificate import Proof
+from hevopt.bounds.claim import Proof
 from hevopt.bounds.proof_file import digest_of, proof_of, table_arrays
 
 

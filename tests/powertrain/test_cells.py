@@ -8,7 +8,7 @@ from between import DRIVES, below_lines, drains_w, part, samples_of
 
 from hevopt import build_problem, certify, load_architecture, simulate, solve
 from hevopt.bounds import step_prices, virtual
-from hevopt.bounds.certificate import Scope
+from hevopt.bounds.claim import Scope
 
 WEIGHTS = (0.0, 10.0, 50.0)
 

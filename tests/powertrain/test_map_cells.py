@@ -8,7 +8,7 @@ import pytest
 from between import DRIVES, dense_below, part
 
 from hevopt import build_problem, certify, load_architecture, simulate, solve
-from hevopt.bounds.certificate import Scope
+from hevopt.bounds.claim import Scope
 from hevopt.bounds.step_prices import dual_of_shape
 from hevopt.car.engine_laws import EngineMap
 from hevopt.car.grid import interpolated

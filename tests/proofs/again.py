@@ -21,7 +21,7 @@ from proofs.split import drawn
 
 from hevopt import Certificate, InfeasibleError, Problem, certify, simulate
 from hevopt.bounds import certificate as certificate_module
-from hevopt.bounds.certificate import Proof, Scope
+from hevopt.bounds.claim import Proof, Scope
 from hevopt.bounds.proof_file import digest_of, proof_of, table_arrays
 from hevopt.errors import SolverError
 from hevopt.problem.problem import Trajectory

@@ -10,7 +10,7 @@ from proofs.exact import every_plan
 
 from hevopt import ControlTable, InfeasibleError, Problem, certify, simulate
 from hevopt.bounds import certificate as certificate_module
-from hevopt.bounds.certificate import Scope
+from hevopt.bounds.claim import Scope
 from hevopt.strategies import dp
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from hevopt.bounds.certificate import PROOF_WORDS, SCOPE_WORDS
+from hevopt.bounds.claim import PROOF_WORDS, SCOPE_WORDS
 from hevopt.pages.comparison.alerts import alerts
 from hevopt.pages.comparison.assumptions import assumptions
 from hevopt.pages.comparison.results import Item, Results, SavedRow, Sensitivity

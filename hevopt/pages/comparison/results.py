@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, InstanceOf, PlainSerializer
 
-from hevopt.bounds.certificate import Claim
+from hevopt.bounds.claim import Claim
 from hevopt.files.lookup import dumped_json
 from hevopt.files.toml import FileModel
 from hevopt.pages.comparison.saved_car import CarFigures, Number, Whole

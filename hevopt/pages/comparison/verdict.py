@@ -2,7 +2,7 @@
 
 from math import inf
 
-from hevopt.bounds.certificate import Scope
+from hevopt.bounds.claim import Scope
 from hevopt.pages.comparison.results import Results, RowFigures
 from hevopt.pages.render import fixed
 from hevopt.studies.rows import end_asked_text, marked

@@ -147,7 +147,6 @@ def jobs_of(
     """
     # Workers import this module too, and leave what solves to their processes.
     from hevopt.strategies import STRATEGIES, Strategy
-    from hevopt.studies.case import require_nox
 
     common = {"code": physics_digest(), "versions": versions(), "allow_shortfall": allow_shortfall}
     traces = {cycle: load_cycle(cycle) for cycle in cycles}
@@ -163,6 +162,8 @@ def jobs_of(
         car = load_architecture(architecture, changes)
         heaviest = max(weight for _, weight in members)
         if heaviest > 0:
+            from hevopt.studies.case import require_nox
+
             require_nox(car, f"{NOX_WEIGHT} {heaviest:g}")
         for cycle in cycles:
             inputs = inputs_digest(car, traces[cycle])

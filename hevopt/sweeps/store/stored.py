@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args, get_t
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
-from hevopt.bounds.certificate import Claim
+from hevopt.bounds.claim import Claim
 from hevopt.errors import DataError
 from hevopt.files.lookup import loaded_json
 from hevopt.studies.rows import Row

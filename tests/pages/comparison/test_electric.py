@@ -3,7 +3,7 @@
 import pytest
 from sizing_helpers import CYCLE
 
-from hevopt.bounds.certificate import PROOF_WORDS
+from hevopt.bounds.claim import PROOF_WORDS
 from hevopt.output.terminal_tables import comparison_notes, comparison_table, left_out
 from hevopt.pages.comparison.collect import Collector
 from hevopt.pages.comparison.page import comparison_page
