@@ -16,7 +16,7 @@ from hevopt.forward.asked import Asking, follow_asked
 from hevopt.forward.breathing import EngineModel, check_steady
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of
-from hevopt.forward.run import STEP_S, ForwardRun, follow
+from hevopt.forward.run import STEP_S, ForwardRun, check_step, follow, whole_handling
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.problem import Trajectory
 from hevopt.strategies import strategy_named
@@ -119,6 +119,7 @@ def drive(
     strategy_named(strategy)
     asking.check()
     check_steady(car, engine_model)
+    check_step(step_s, whole_handling(car, handling))
     line_of(car)
     case = prepare(car, cycle, settings)
     row, _, trajectory = run_case(case, strategy, settings.horizon_s)

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from forward.drives import driven
 
+from hevopt import DataError, drive, load_architecture, load_cycle
+from hevopt.car.handling import DriverGains, Handling
+from hevopt.forward.asked import Asking
 from hevopt.output.driven_tables import audit, twin_table
 from hevopt.studies.driven import KINDS, WAY
 
@@ -85,3 +88,19 @@ def test_without_an_engine_no_column_of_fuel_is_shown():
     assert heads("C2") == [
         "", "fuel", "corrected", "battery", "NOx", "SOC", "starts", "status",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"step_s": 0.5}, "step 0.5 s; allowed: 0.001 to 0.1 s"),
+        ({"step_s": float("nan")}, "step nan s"),
+        ({"handling": Handling(driver=DriverGains(900.0))}, "swings ever more"),
+        ({"asking": Asking(dwell_s=-1.0)}, "dwell -1 s; allowed: 0 to 60 s"),
+        ({"strategy": "dq"}, "close matches: dp"),
+    ],
+)
+def test_what_cannot_be_driven_is_told_before_anything_is_solved(options, message, monkeypatch):
+    monkeypatch.setattr("hevopt.studies.driven.prepare", lambda *_: pytest.fail("it is solved"))
+    with pytest.raises(DataError, match=message):
+        drive(load_architecture("C2"), load_cycle("nedc"), **options)
