@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def replay_of(trajectory: Trajectory, line: Line) -> ForwardPlan:
     states = flows.states(columns[trajectory.control])
     free = runs_free(flows.car, states, signals.speed_mps, trajectory.flows["engine_speed_radps"])
     in_gear, open_while = driver_gears(signals, states, free)
-    way = [line.index(int(g), state.gears) for g, state in zip(in_gear, states, strict=True)]
+    index = cache(line.index)
+    way = [index(g, state.gears) for g, state in zip(in_gear.tolist(), states, strict=True)]
     found, course = trajectory.flows, None
     torques = _own(np.stack([found[f"{name}_torque_nm"] for name in flows.machines], axis=1))
     ordered = _own(torques[:, list(line.order)])
