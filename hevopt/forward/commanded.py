@@ -175,11 +175,10 @@ class CommandedCar:
         self._check(commands)
         self._fill(commands)
         if loop is None:
-            wanted = float(self._task.speed_mps[0])
             self._task.speed_mps[:] = self._speed_mps
             self._begin_within()
             loop = self._driving.begun(before.stored_j)
-            self._task.speed_mps[:] = wanted
+            self._fill(commands)
         start = float(loop.state.speed_mps), float(loop.state.side_radps), before.stored_j
         asked = PedalState(float(commands.force_n), 0.0, 0.0, 0.0, False)
         loop = loop._replace(pedal=asked, ahead_mps=float(self._task.speed_mps[0]))

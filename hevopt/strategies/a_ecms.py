@@ -102,7 +102,8 @@ class AdaptiveFactor:
 
     def decide(self, k: int, energy_j: float, mode: int) -> int:
         """Index of the control of least equivalent cost at step k."""
-        at = State(mode, energy_j)
+        # Types are looked at once: a whole number of joules is none.
+        at = State(int(mode), float(energy_j))
         if self._adaptive is None:
             self._adaptive = typed(
                 kernels.adaptive, self.choices, k, at, self.view, self.memory, *self._same

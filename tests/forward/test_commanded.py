@@ -171,6 +171,14 @@ def test_what_a_car_has_not_is_not_asked_of_it(name, asked, fault):
         CommandedCar(load_architecture(name)).advance(asked)
 
 
+def test_steps_of_a_first_call_are_those_of_as_many_calls():
+    asked = Commands(force_n=2000.0, engine_radps=400.0, engine_nm=60.0, engine_on=True)
+    at_once = CommandedCar(load_architecture("prius_1998"), step_s=0.1)
+    one_by_one = CommandedCar(load_architecture("prius_1998"), step_s=0.1)
+    records = [one_by_one.advance(asked).record for _ in range(20)]
+    assert np.array_equal(at_once.advance(asked, 20).record, np.concatenate(records))
+
+
 def test_an_engine_begins_no_faster_than_its_generator_may_turn():
     car = CommandedCar(load_architecture("prius_1998"), step_s=0.1)
     moved = car.advance(Commands(engine_radps=400.0, engine_nm=20.0))

@@ -46,19 +46,30 @@ def test_results_come_back_in_order_from_both_processes() -> None:
 
 
 def test_first_process_does_what_comes_after_while_it_waits() -> None:
-    done: list[tuple[int, int]] = []
-
-    def meanwhile() -> None:
-        done.append((os.getpid(), tally.total()))
-
-    def work(n: int) -> None:
-        time.sleep(0.05 if os.getpid() == own else 0.5)
-        tally.add(1)
-
+    done: list[int] = []
     own, tally = os.getpid(), SharedCount()
-    halves(work, range(4), tally, meanwhile)
 
-    assert done == [(own, 3)]
+    def work(n: int) -> int:
+        if os.getpid() != own:
+            tally.add(1)
+            time.sleep(0.5)
+        while not tally.total():
+            time.sleep(0.01)
+        return os.getpid()
+
+    found = halves(work, range(4), tally, lambda: done.append(os.getpid()))
+
+    assert done == [own] and len(set(found)) == 2
+
+
+def test_what_another_process_reads_is_as_if_it_were_read_here(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("hevopt.studies.halves.two_processors", lambda: True)
+    car, cycle = ahead(lambda: (cars_of(("C2",), Settings()).cars[0], load_cycle("nedc")))()
+
+    assert not car.battery.soc.flags.writeable and not cycle.speed_mps.flags.writeable
+    assert {array.flags.writeable for array in car.battery.arrays[:5]} == {False}
 
 
 def test_cars_with_more_states_and_strategies_are_solved_first(
