@@ -43,7 +43,7 @@ ENERGY_NODES = 1001
 _BANDS = (1.0, 0.1, 0.01, 0.003, 0.001)
 _GAIN_WORTH_MORE = 2e-5
 # The grids of a quick look, as shares of window and nodes; the path is tried from the second on.
-_QUICK = ((1.0, 0.25), (0.1, 0.5), (0.01, 0.5))
+_QUICK = ((1.0, 0.25), (0.1, 1.0), (0.01, 1.0))
 # Times the gap that is enough within which what a bound leaves open counts as the bound's own.
 _NEARLY = 4.0
 # Missing charge costs this many times what it is worth.
