@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hevopt._compile import compiled
 from hevopt.forward import _drive_kernels as col
 from hevopt.forward import _motor_kernels as motor
-from hevopt.forward._rows_kernels import Ways
+from hevopt.forward._rows_kernels import Ways, turning
 
 Array = NDArray[np.float64]
 
@@ -76,11 +76,8 @@ def _turn(
 ) -> None:
     """Speed of every unit, and of it the part that the wheels turn: (2, unit), filled."""
     for u in range(len(ways.inertia_kgm2)):
-        a, b = ways.wheel[way, u], ways.side[way, u]
-        a += blend * (ways.wheel[from_way, u] - a)
-        b += blend * (ways.side[from_way, u] - b)
-        speeds[1, u] = a * wheel
-        speeds[0, u] = a * wheel + b * side
+        speeds[1, u] = turning(ways.wheel, way, from_way, blend, u) * wheel
+        speeds[0, u] = speeds[1, u] + turning(ways.side, way, from_way, blend, u) * side
 
 
 @compiled(bare=True)

@@ -97,6 +97,22 @@ def _clip(value: float, low: float, high: float) -> float:
 
 
 @compiled(bare=True)
+def governed(car: FreeCar, wheel: float) -> tuple[float, float]:
+    """Lowest and highest speed of the engine at which its governor may turn with it, at a speed of the wheels."""
+    unit, top = car.governor + 1, _NEARLY * car.motors.top_radps[car.governor]
+    own, per = car.loop.ways.wheel[0, unit] * wheel, car.loop.ways.side[0, unit]
+    ends = (-top - own) / per, (top - own) / per
+    return min(ends), max(ends)
+
+
+@compiled(bare=True)
+def begins_radps(car: FreeCar, course: FreeCourse, speed_mps: float) -> float:
+    """Speed at which the engine turns as a car begins: no faster than its governor may turn with it."""
+    low, high = governed(car, speed_mps / car.loop.body.radius_m)
+    return float(max(min(max(course.engine_radps[0], low), high), car.loop.limits.idle_radps))
+
+
+@compiled(bare=True)
 def side_after(
     car: FreeCar, course: FreeCourse, now: Now, phase: int, wheel: float, ahead: float, step_s: float, more: float
 ) -> float:  # fmt: skip
@@ -113,13 +129,8 @@ def side_after(
             target = ways.wheel[0, len(ways.inertia_kgm2) - 1] * ahead
         target = min(max(target, idle), _NEARLY * limits.engine_max_radps)
         after = n + (1.0 - np.exp(-step_s / driver.governor_s)) * (target - n)
-        top = _NEARLY * car.motors.top_radps[car.governor]
-        low, high, per = -np.inf, np.inf, ways.side[0, car.governor + 1]
-        for speed in (wheel, ahead):
-            own = ways.wheel[0, car.governor + 1] * speed
-            ends = (-top - own) / per, (top - own) / per
-            low, high = max(low, min(ends)), min(high, max(ends))
-        return float(max(min(max(after, low), high), idle))
+        (low, high), (low_ahead, high_ahead) = governed(car, wheel), governed(car, ahead)
+        return float(max(min(max(after, low, low_ahead), high, high_ahead), idle))
     if phase == motor.STARTING:
         return max(min(n + idle / driver.start_s * step_s, idle), min(n, idle))
     return max(n - idle / driver.stop_s * step_s, 0.0)

@@ -28,6 +28,7 @@ from hevopt.forward._free_kernels import (
     FreeCourse,
     FreeWish,
     allotted,
+    begins_radps,
     bus_w,
     may_not_rest,
     side_after,
@@ -61,7 +62,7 @@ class FreeLoop(NamedTuple):
 def begun(car: FreeCar, task: LoopTask, course: FreeCourse, start_j: float) -> FreeLoop:
     """The loop before its first step."""
     on = task.engine_on[0]
-    side = max(course.engine_radps[0], car.loop.limits.idle_radps) if on else 0.0
+    side = begins_radps(car, course, task.speed_mps[0]) if on else 0.0
     state = State(task.speed_mps[0], 0.0, side, task.way[0], task.way[0], 0.0, 0, 0.0, 0.0, 0.0)
     closing = 1.0 if on and course.closed[0] else 0.0
     return FreeLoop(state, PedalState(0.0, 0.0, 0.0, 0.0, True), motor.TURNING if on else motor.REST,

@@ -34,8 +34,6 @@ from hevopt.problem.battery import energy_j, soc
 # A speed wanted, at which the loop's driver does not hold the car.
 _MOVES_MPS = 1.0
 _FASTEST_MPS = 100.0
-# Share of its highest speed up to which a machine is turned as the car begins.
-_NEARLY = 0.999
 # The loop's driver passes on what stands in his integral, and nothing of his own.
 _NO_GAINS = {
     "proportional": 0.0, "integral": 0.0, "derivative": 0.0, "feed_forward": 0.0, "preview_s": 0.0,
@@ -176,7 +174,6 @@ class CommandedCar:
         self._fill(commands)
         if loop is None:
             self._task.speed_mps[:] = self._speed_mps
-            self._begin_within()
             loop = self._driving.begun(before.stored_j)
             self._fill(commands)
         start = float(loop.state.speed_mps), float(loop.state.side_radps), before.stored_j
@@ -237,20 +234,6 @@ class CommandedCar:
             course.engine_radps[0] = min(commands.engine_radps, self.car.engine.speed_max_radps)
             course.engine_nm[0] = commands.engine_nm
             course.machine_nm[0], course.closed[0] = torques, commands.clutch_closed
-
-    def _begin_within(self) -> None:
-        """The engine's speed as the car begins: no faster than the machine that keeps it may turn with it."""
-        line, course = self.line, self._course
-        if line.free is None or course is None:
-            return
-        governor = line.free.governor
-        top, per = (
-            _NEARLY * self.car.machines[governor].speed_max_radps,
-            line.ways.side[0, governor + 1],
-        )
-        own = line.ways.wheel[0, governor + 1] * self._speed_mps / self.car.vehicle.tyre_radius_m
-        ends = (-top - own) / per, (top - own) / per
-        course.engine_radps[0] = np.clip(course.engine_radps[0], min(ends), max(ends))
 
     def _way(self, commands: Commands) -> int:
         known = self.line.gears

@@ -8,7 +8,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.forward import _drive_kernels as geared
 from hevopt.forward import _free_loop_kernels as free
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
-from hevopt.forward._free_kernels import FreeCar, FreeCourse
+from hevopt.forward._free_kernels import FreeCar, FreeCourse, begins_radps
 from hevopt.forward.breathing import Breathing, EngineModel, breathing_of, check_steady
 from hevopt.forward.limits import motors_of
 from hevopt.forward.lines import Line
@@ -49,9 +49,9 @@ class Driving:
     @property
     def start_radps(self) -> float:
         """Speed at which the engine turns, or would if it did, as the task begins."""
-        if self.course is None:
+        if self._free is None or self.course is None:
             return self._start
-        return float(max(self._driven.limits.idle_radps, self.course.engine_radps[0]))
+        return float(begins_radps(self._free, self.course, float(self._task.speed_mps[0])))
 
     def begun(self, start_j: float) -> Any:
         """The loop before its first step, with a stored energy."""

@@ -12,8 +12,8 @@ from hevopt.problem.switching import Switching
 from hevopt.strategies._contending_kernels import Penalty, Room, contenders, rises_of, room_for
 from hevopt.strategies._rollout_kernels import Grid
 
-# Divisions of a whole battery's energy between which a move over its curves is taken as linear, and the fewest and
-# the most nodes of a grid that are one.
+# Divisions of a whole battery's energy between which a move over its curves is taken as linear, and about
+# the fewest and the most nodes of a grid that are one.
 _DIVISIONS, _NODES_LEAST, _NODES_MOST = 40, 40, 128
 
 

@@ -9,9 +9,12 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from hevopt.errors import HevoptError
+
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkProcess
 
 _Result = TypeVar("_Result")
 # How often the process that was forked looks whether the first is still there.
@@ -64,24 +67,16 @@ def halves(
     Results come back by number, whoever made them, and so does an error: the first that is raised on purpose. What
     the other process does not bring back, as where it was killed, is done here.
     """
-    from multiprocessing import get_context
-
     count = len(order)
     tickets, issued = os.pipe()
     os.write(issued, bytes(order))
     os.close(issued)
-    context = get_context("fork")
-    here, there = context.Pipe(duplex=False)
-    other = context.Process(
-        target=_other, args=(work, tickets, tally, there, os.getpid()), daemon=True
-    )
-    other.start()
-    there.close()
+    other, here = _forked(_other, work, tickets, tally)
     try:
         found = _taken(work, tickets)
         meanwhile()
-        with suppress(EOFError, OSError, pickle.UnpicklingError):
-            found |= here.recv()
+        for beside in _heard(here):
+            found |= beside
         for n in range(count):
             if n not in found:
                 found[n] = _tried(work, n)
@@ -107,18 +102,10 @@ def ahead(work: Callable[[], _Result]) -> Callable[[], _Result]:
     """
     if not two_processors():
         return work
-    from multiprocessing import get_context
-
-    context = get_context("fork")
-    here, there = context.Pipe(duplex=False)
-    other = context.Process(target=_send, args=(work, there, os.getpid()), daemon=True)
-    other.start()
-    there.close()
+    other, here = _forked(_send, work)
 
     def result() -> _Result:
-        found: list[Any] = []
-        with suppress(EOFError, OSError, pickle.UnpicklingError):
-            found.append(pickle.loads(here.recv_bytes()))
+        found = _heard(here)
         here.close()
         other.join()
         if not found:
@@ -130,6 +117,31 @@ def ahead(work: Callable[[], _Result]) -> Callable[[], _Result]:
     return result
 
 
+def _forked(target: Callable[..., None], *given: Any) -> "tuple[ForkProcess, Connection]":
+    """A process forked from this one, told what is given, where to tell what it finds, and who is the first; and
+    where that is heard."""
+    from multiprocessing import get_context
+
+    context = get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    other = context.Process(target=target, args=(*given, there, os.getpid()), daemon=True)
+    other.start()
+    there.close()
+    return other, here
+
+
+def _tell(there: Connection, found: Any) -> None:
+    # Arrays that nobody may write stay so by this protocol alone: loops are compiled for one kind of them.
+    there.send_bytes(pickle.dumps(found, protocol=5))
+
+
+def _heard(here: Connection) -> list[Any]:
+    """What the other process found; empty where it ended before it told."""
+    with suppress(EOFError, OSError, pickle.UnpicklingError):
+        return [pickle.loads(here.recv_bytes())]
+    return []
+
+
 def _send(work: Callable[[], Any], there: Connection, first: int) -> None:
     _depend_on(first)
     # Any other error than those on purpose is met by the first process, which does the work itself then.
@@ -138,8 +150,7 @@ def _send(work: Callable[[], Any], there: Connection, first: int) -> None:
             found = work()
         except HevoptError as error:
             found = error
-        # Arrays that nobody may write stay so by this protocol alone: loops are compiled for one kind of them.
-        there.send_bytes(pickle.dumps(found, protocol=5))
+        _tell(there, found)
 
 
 def _other(
@@ -147,7 +158,7 @@ def _other(
 ) -> None:
     _depend_on(first)
     tally.in_other_process()
-    there.send(_taken(work, tickets))
+    _tell(there, _taken(work, tickets))
 
 
 def _depend_on(first: int) -> None:
