@@ -245,9 +245,15 @@ def test_neither_importing_hevopt_nor_help_loads_what_is_slow_to_load(words):
     [
         ("hevopt.load_architecture('C2'), hevopt.load_cycle('nedc')", "numba"),
         ("hevopt.compare", "hevopt.car_files.load"),
+        ("hevopt.compare", "pydantic"),
         ("hevopt.STRATEGIES, hevopt.sweep", "numba"),
     ],
-    ids=["reading cars without loops", "computing without models of files", "planning a sweep"],
+    ids=[
+        "reading cars without loops",
+        "computing without models of files",
+        "computing without checks of settings",
+        "planning a sweep",
+    ],
 )
 def test_reading_and_computing_can_be_loaded_at_once_by_two_processes(work, spared):
     code = f"import sys, hevopt; {work}; sys.exit({spared!r} in sys.modules)"

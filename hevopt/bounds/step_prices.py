@@ -49,7 +49,7 @@ from hevopt.errors import SolverError
 from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import BatteryArrays
-from hevopt.problem.arrays import Array, Flags
+from hevopt.problem.arrays import Array, Flags, rising
 from hevopt.problem.choices import Choices, State, without_dominated
 from hevopt.problem.problem import Problem, Trajectory
 
@@ -264,7 +264,7 @@ def window_cells(problem: Problem, cells: int) -> WindowCells:
     """At least that many cells, every point of the curves among their edges."""
     inside = problem.battery.within_window()
     even = np.linspace(inside.soc[0], inside.soc[-1], cells + 1)
-    edges_soc = np.union1d(even, inside.soc)
+    edges_soc = rising(even, inside.soc)
     voltage, discharge, charge = (
         np.interp(edges_soc, inside.soc, curve)
         for curve in (inside.open_circuit_v, inside.discharge_ohm, inside.charge_ohm)

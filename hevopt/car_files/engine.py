@@ -22,6 +22,7 @@ from hevopt.car_files.fields import (
 )
 from hevopt.car_files.mean_value import MeanValueFile
 from hevopt.files.toml import FileModel
+from hevopt.problem.arrays import rising
 
 Dwell = Annotated[float, Field(ge=0, le=3600)]
 NotPositive = Annotated[float, Field(ge=-1e6, le=0)]
@@ -133,7 +134,7 @@ class EngineFile(FileModel):
         if self.fuel_coefficients is None:
             return self
         k, curve = self.fuel_coefficients, self.full_load
-        rpm = np.union1d(np.linspace(0.0, curve.speed_rpm[-1], 201), curve.speed_rpm)
+        rpm = rising(np.linspace(0.0, curve.speed_rpm[-1], 201), curve.speed_rpm)
         piston_mps = 2 * self.stroke_mm / 1e3 * rpm / 60
         slope = k.a + k.b * piston_mps + k.c * piston_mps**2
         torque = np.interp(rpm, curve.speed_rpm, curve.torque_nm)

@@ -16,7 +16,7 @@ from hevopt.errors import DataError, Fault
 from hevopt.files.lookup import read_text
 from hevopt.files.toml import FileModel, faults_of, read_contents
 from hevopt.measured.tables.table import columns_found, read_measured
-from hevopt.studies.settings import CompareFile
+from hevopt.studies.given import CompareFile
 from hevopt.sweeps.plan.study_file import StudyFile
 from hevopt.units import KMH_PER_MPS
 

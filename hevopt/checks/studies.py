@@ -25,8 +25,10 @@ from hevopt.files.shown import printable
 from hevopt.files.toml import read_contents
 from hevopt.strategies import chosen, strategy_named
 from hevopt.strategies.brought import is_reference, located
+from hevopt.studies.allowed import NAMES_MAX
 from hevopt.studies.cars import cars_of
-from hevopt.studies.settings import KEYS, NAMES_MAX, CompareFile, study_of
+from hevopt.studies.given import CompareFile, study_of
+from hevopt.studies.settings import KEYS
 from hevopt.studies.solved import EVERY, check_horizon
 from hevopt.studies.study_file import beside_study, changes_in, read_study
 from hevopt.sweeps.plan.brought import check_defined

@@ -1,11 +1,11 @@
 """What `hevopt compare` is told, the files it leaves behind, and what it prints."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from hevopt.commands.reporting import command_line
 from hevopt.commands.terminal import Progress, show, show_notes, text_of, width, write
@@ -22,38 +22,10 @@ if TYPE_CHECKING:
     from hevopt.studies.cold_start import ColdStarts
     from hevopt.studies.comparison import Comparison
     from hevopt.studies.rows import Row
-    from hevopt.studies.settings import Settings, Study
+    from hevopt.studies.settings import Settings
 
 # Settings that results name beside what was changed in the cars.
 _NAMED = ("nox_weight", "allow_shortfall", "free_gear", "refine", "horizon_s")
-
-
-class Read(NamedTuple):
-    """What a comparison reads: cars, cycle, and whether both are those of the published study, as shipped."""
-
-    cars: "Cars"
-    trace: "Cycle"
-    is_study: bool
-
-
-def read_ahead(asked: "Study") -> "Callable[[], Read]":
-    """What gives the cars and the cycle of a comparison, or the error of reading them.
-
-    Another process reads them, where there is a processor for it, so that this one can load what computes.
-    """
-    # Both need these.
-    from hevopt.driving.cycle import load_cycle
-    from hevopt.studies.cars import cars_of
-    from hevopt.studies.halves import ahead
-
-    def read() -> Read:
-        from hevopt.reproduction.published import is_study
-
-        cars = cars_of(asked.architectures, asked.settings)
-        trace = load_cycle(asked.cycle)
-        return Read(cars, trace, is_study(cars.cars, trace))
-
-    return ahead(read)
 
 
 def cold_starts(degc: float | None) -> "ColdStarts | None":
@@ -69,7 +41,7 @@ def cold_starts(degc: float | None) -> "ColdStarts | None":
 class ComparisonJob:
     """Cars on a cycle, the settings that they are solved with, the study file, if they come from one, and the
     strategies that were brought, by name; cold: takes what rows burn from a cold start, where that is asked for
-    is_study: whether published figures may stand beside the results, see `Read`
+    is_study: whether published figures may stand beside the results, see `reading.Read`
     """
 
     cars: "Cars"

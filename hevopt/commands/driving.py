@@ -64,7 +64,7 @@ def drive(
     from hevopt.output.file_tables import check_table_file, write_frame
     from hevopt.studies.cars import cars_of
     from hevopt.studies.driven import drive as driven_by
-    from hevopt.studies.settings import given_of, study_of
+    from hevopt.studies.given import given_of, study_of
 
     settings = study_of(given_of("the command line", given)).settings
     job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)

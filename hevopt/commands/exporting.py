@@ -29,7 +29,7 @@ def fmu(
     from hevopt.files.writing import check_outs
     from hevopt.fmu import export_fmu
     from hevopt.studies.cars import cars_of
-    from hevopt.studies.settings import given_of, study_of
+    from hevopt.studies.given import given_of, study_of
 
     cars = cars_of([architecture], study_of(given_of("the command line", given)).settings)
     car = cars.cars[0]

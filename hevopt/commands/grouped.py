@@ -1,6 +1,7 @@
 """`--help` in groups: commands by what they are for, options by what they are about, with an example each."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from typer.core import TyperCommand, TyperGroup
@@ -72,6 +73,10 @@ EXAMPLES = {name: example for group in GROUPS for name, example in group.example
 class GroupedCommands(TyperGroup):
     """A group whose help lists its commands group by group, the first command's example below each."""
 
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, of which those left out are taken as they are."""
+        return _lightly_taken(super().get_params(ctx))
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the groups; commands of none of them come last."""
         known = {name: command for name, command in self.commands.items() if not command.hidden}
@@ -93,6 +98,10 @@ class GroupedCommands(TyperGroup):
 class GroupedOptions(TyperCommand):
     """A command whose help lists its options by the group that each names, and ends with an example."""
 
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, of which those left out are taken as they are."""
+        return _lightly_taken(super().get_params(ctx))
+
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write arguments, options without a group, then the groups in the order in which they come."""
         groups: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
@@ -109,3 +118,19 @@ class GroupedOptions(TyperCommand):
         if self.name in EXAMPLES:
             with formatter.section("Example"):
                 formatter.write_text(EXAMPLES[self.name])
+
+
+def _lightly_taken(parameters: list[Any]) -> list[Any]:
+    """Spare what is left out that which checks values: typer loads pydantic for it, a tenth of a comparison."""
+    for parameter in parameters:
+        if "process_value" not in vars(parameter):
+            parameter.process_value = partial(_taken, parameter, parameter.process_value)
+    return parameters
+
+
+def _taken(parameter: Any, checked: Callable[[Any, Any], Any], ctx: Any, value: Any) -> Any:
+    if value is not None or parameter.required:
+        return checked(ctx, value)
+    nothing = () if parameter.multiple or parameter.nargs == -1 else None
+    own = parameter.callback
+    return nothing if own is None else own(ctx, parameter, nothing)

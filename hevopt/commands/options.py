@@ -118,12 +118,12 @@ def takes_settings(*without: str) -> Callable[[Callable[..., None]], Callable[..
 
 
 def _as_in_a_file(given: dict[str, Any]) -> dict[str, Any]:
-    from hevopt.studies.study_file import assignments
-
     values = dict(given)
     if "strategies" in values:
         values["strategies"] = listed(values["strategies"])
     if "changes" in values:
+        from hevopt.studies.study_file import assignments
+
         values["set"] = assignments(values.pop("changes"))
     if "soc_end" in values:
         try:

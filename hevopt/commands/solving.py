@@ -100,15 +100,11 @@ def compare(
     ] = False,
 ) -> None:
     """Strategies on architectures over one cycle, each with its certified bound."""
-    from hevopt.commands.comparing import read_ahead
-    from hevopt.studies.settings import given_of, joined, study_of
-    from hevopt.studies.study_file import read_study
+    from hevopt.commands.reading import read_ahead
 
     named = {"cycle": cycle, "architectures": listed(architectures)}
     options = given | {name: value for name, value in named.items() if value is not None}
-    below = {"set": {}} if study_path is None else read_study(study_path)
-    asked = study_of(joined(below, given_of(_OPTIONS, options)))
-    read = read_ahead(asked)
+    read = read_ahead(options, _OPTIONS, study_path)
 
     from hevopt.commands.brought import brought_to
     from hevopt.commands.comparing import (
@@ -124,8 +120,8 @@ def compare(
 
     of_study = study_path is not None and "strategies" not in options
     folder = study_path.parent if study_path is not None and of_study else None
-    settings, others = brought_to(asked.settings, policy, folder)
-    cars, trace, is_study = read()
+    settings, cars, trace, is_study = read()
+    settings, others = brought_to(settings, policy, folder)
     cold = cold_starts(cold_start)
     job = ComparisonJob(cars, trace, settings, study_path, others, cold, is_study)
     files = Files(out, steps, page, save, proofs, fronts, effects, nox_limit)
@@ -181,7 +177,7 @@ def run(
     from hevopt.studies.by_car import lost_proofs
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import prepare
-    from hevopt.studies.settings import given_of, study_of
+    from hevopt.studies.given import given_of, study_of
     from hevopt.studies.solved import causal_among, check_horizon, run_case, why_not_causal
 
     settings = study_of(given_of(_OPTIONS, given)).settings
@@ -248,7 +244,7 @@ def table(
     from hevopt.powertrain.powertrain import build_problem
     from hevopt.studies.cars import cars_of
     from hevopt.studies.case import require_nox
-    from hevopt.studies.settings import given_of, study_of
+    from hevopt.studies.given import given_of, study_of
 
     settings = study_of(given_of(_OPTIONS, given)).settings
     job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)

@@ -54,7 +54,7 @@ def pareto(
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies.cars import cars_of
     from hevopt.studies.fronts import front_of
-    from hevopt.studies.settings import given_of, study_of
+    from hevopt.studies.given import given_of, study_of
 
     if "nox_weight" in given:
         raise DataError("--nox-weight: a front has many weights; give them as --weights 0,10,100")
@@ -93,8 +93,8 @@ def sensitivity(
     from hevopt.commands.studies_view import SHORTFALL_NOTE, effects_notes, effects_table
     from hevopt.driving.cycle import load_cycle
     from hevopt.studies.cars import cars_of
+    from hevopt.studies.given import given_of, study_of
     from hevopt.studies.sensitivity import effects_on
-    from hevopt.studies.settings import given_of, study_of
 
     settings = study_of(given_of(_OPTIONS, given)).settings
     cars, trace = cars_of([architecture], settings), load_cycle(cycle)

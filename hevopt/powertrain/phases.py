@@ -170,5 +170,5 @@ def _opened(
             frozenset(part.name for n, part in enumerate(limited) if code >> n & 1),
             step[codes == code],
         )
-        for code in np.unique(codes)
+        for code in sorted(set(codes.tolist()))
     ]

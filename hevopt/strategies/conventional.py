@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from hevopt.problem.arrays import Array, Indices
+from hevopt.problem.arrays import Array, Indices, rising
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._rules import (
     Calibrated,
@@ -53,7 +53,7 @@ def start(
         np.asarray(usual if own is None else own, dtype=np.float64)
         for own, usual in zip(asked, _axes(rules), strict=True)
     ]
-    coarse = [np.unique(np.append(axis[::_COARSE], axis[-1])) for axis in axes]
+    coarse = [rising(axis[::_COARSE], axis[-1:]) for axis in axes]
     near = [ElectricLimits(*limits) for limits in product(*coarse)]
     quick, exact = _Judged(rules, engine, quick=True), _Judged(rules, engine, quick=False)
     centre = near[int(np.argmin(_ranked(rules, quick.figures(near))))]
@@ -159,7 +159,7 @@ def _ranked(rules: Rules, results: Array) -> Array:
 
 def _sections(axes: Sequence[Array], centre: ElectricLimits) -> list[ElectricLimits]:
     """The members on lines through one, a line along each axis; on the first line it stands itself."""
-    power = [centre._replace(power_w=float(value)) for value in np.union1d(axes[1], centre.power_w)]
+    power = [centre._replace(power_w=float(value)) for value in rising(axes[1], [centre.power_w])]
     speed = [centre._replace(speed_mps=float(value)) for value in axes[2]]
     soc = [centre._replace(soc=float(value)) for value in axes[0]]
     return [*power, *(limits for limits in (*speed, *soc) if limits != centre)]

@@ -23,7 +23,7 @@ from hevopt.studies.drawing import draw_rows
 from hevopt.studies.forward_rows import ForwardFigures, forward_figures
 from hevopt.studies.frames import rows_frame
 from hevopt.studies.rows import Row, against_reference
-from hevopt.studies.settings import Keywords, Settings, settings_from
+from hevopt.studies.settings import Keywords, Settings
 from hevopt.studies.solved import (
     causal_among,
     check_horizon,
@@ -126,6 +126,9 @@ def compare(
     Raises DataError for a wrong name, file or setting, with those that there are. Where an engine has no NOx data,
     what asks for NOx is a failed row; UnknownNoxError if nothing else is asked.
     """
+    # Here, as it takes long to load, and `compare_cars` needs none of it.
+    from hevopt.studies.given import settings_from
+
     names, others = chosen(strategies)
     told = settings_from("compare", settings, strategies=names)
     if isinstance(architectures, Architecture | str | Path):

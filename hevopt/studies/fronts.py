@@ -18,9 +18,10 @@ from hevopt.studies.by_car import Progress, unseen
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import litres, prepare, require_nox
 from hevopt.studies.comparison import Strategies
+from hevopt.studies.given import settings_from
 from hevopt.studies.pareto import GAP_ENOUGH, POINTS_MAX, SAME, Front, HalfPlane, front
 from hevopt.studies.rows import shortfall_steps
-from hevopt.studies.settings import Keywords, Settings, settings_from
+from hevopt.studies.settings import Keywords, Settings
 from hevopt.studies.solved import check_horizon
 
 if TYPE_CHECKING:

@@ -22,8 +22,9 @@ from hevopt.studies.by_car import Progress, unseen
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import Case, prepare
 from hevopt.studies.comparison import Strategies
+from hevopt.studies.given import settings_from
 from hevopt.studies.rows import Row
-from hevopt.studies.settings import Keywords, Settings, settings_from
+from hevopt.studies.settings import Keywords, Settings
 from hevopt.studies.solved import check_horizon, run_case
 from hevopt.studies.trials import Trial, trials_of
 

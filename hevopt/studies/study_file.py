@@ -22,7 +22,7 @@ from hevopt.errors import DataError
 from hevopt.files.lookup import is_path
 from hevopt.files.shown import printable, shown
 from hevopt.files.toml import read_contents
-from hevopt.studies.settings import flat_changes, given_of
+from hevopt.studies.given import flat_changes, given_of
 
 _NAME_OR_PATH = re.compile(r"[A-Za-z_./~][\w./~ -]*")
 # Keys of files that are none of compare's, and where to give them instead.
@@ -33,7 +33,7 @@ _OTHER_FILES = {
 
 
 def read_study(path: Path) -> dict[str, Any]:
-    """What a study file gives, see `settings.given_of`, its paths taken from where it lies; DataError with every
+    """What a study file gives, see `given.given_of`, its paths taken from where it lies; DataError with every
     fault.
     """
     contents = read_contents(path)

@@ -126,6 +126,20 @@ def test_help_loads_nothing_that_takes_long():
     assert set(done.stderr.split()) <= LIGHT
 
 
+PARSED = """
+import sys
+from hevopt import cli
+from hevopt.commands import reading
+reading.read_ahead = lambda *given: sys.exit("pydantic" in sys.modules)
+sys.argv = ["hevopt", "compare", *sys.argv[1:]]
+cli.main()
+"""
+
+
+def test_a_comparison_without_options_is_read_by_another_process_before_anything_checks_values():
+    assert subprocess.run([sys.executable, "-c", PARSED]).returncode == 0
+
+
 ENDING = """
 import atexit, gc, sys
 atexit.register(lambda: print("left alone:", gc.get_freeze_count() > 1000))

@@ -11,20 +11,14 @@ import pytest
 from command_line import call
 
 from hevopt import DataError, compare, load_architecture, load_cycle, solve
+from hevopt.car_files import fields as of_files
 from hevopt.commands.options import SETTINGS
 from hevopt.files.lookup import shipped_folder
-from hevopt.studies import solved
+from hevopt.studies import allowed, solved
 from hevopt.studies.cars import cars_of
 from hevopt.studies.case import prepare
-from hevopt.studies.settings import (
-    KEYS,
-    CompareFile,
-    Keywords,
-    Settings,
-    given_of,
-    joined,
-    study_of,
-)
+from hevopt.studies.given import CompareFile, given_of, joined, study_of
+from hevopt.studies.settings import KEYS, Keywords, Settings
 from hevopt.studies.study_file import assignments, read_study
 
 STRATEGIES = ("conventional", "nox_cut", "ecms", "dp", "convex", "mpc", "a_ecms", "sdp")
@@ -65,7 +59,7 @@ def of_setting(kind):
 
 
 def test_the_settings_are_one_list_for_study_file_options_and_keywords():
-    hints = get_type_hints(Settings)
+    hints = get_type_hints(Settings, vars(of_files) | vars(allowed))
     keys = {"cycle", "architectures", "set", *hints} - {"changes"}
     assert keys == set(CompareFile.model_fields)
     assert {name: spelt(option) for name, option in SETTINGS.items()} == {
@@ -76,7 +70,7 @@ def test_the_settings_are_one_list_for_study_file_options_and_keywords():
 
 
 def test_every_setting_is_told_of_where_a_user_of_python_looks():
-    for name in get_type_hints(Settings):
+    for name in Settings.__dataclass_fields__:
         assert re.search(rf"\b{name}\b", Settings.__doc__), name
 
 

@@ -20,9 +20,10 @@ from hevopt.studies.cars import Cars, cars_of
 from hevopt.studies.case import require_nox
 from hevopt.studies.comparison import Comparison, Strategies, compare_cars
 from hevopt.studies.fronts import front_of
+from hevopt.studies.given import settings_from
 from hevopt.studies.provenance import files_digests
 from hevopt.studies.sensitivity import effects_on
-from hevopt.studies.settings import Keywords, Settings, settings_from
+from hevopt.studies.settings import Keywords, Settings
 from hevopt.studies.solved import strategies_for
 
 _TOO_MUCH = "`hevopt report` reads no more, nothing is saved; ask for fewer cars or strategies, or a shorter cycle"
