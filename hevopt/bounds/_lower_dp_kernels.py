@@ -94,7 +94,8 @@ def moves_by_cells(choices: Choices, grid: PartedGrid, cells: WindowCells) -> Ar
 def _lower_nodes(best: Array, ahead: Array, cost: float, share: float, rise: float) -> None:
     for j in range(len(best)):
         weight = share + rise * np.int32(j)
-        best[j] = min(best[j], cost + ahead[j] + weight * (ahead[j + 1] - ahead[j]))
+        # With 0.0, which changes nothing, all are stored: see _backward_kernels.py.
+        best[j] = min(best[j], cost + ahead[j] + weight * (ahead[j + 1] - ahead[j])) + 0.0
 
 
 @compiled()
@@ -104,7 +105,7 @@ def _raise_defects(
     for j in range(len(defect)):
         weight = share + rise * np.int32(j)
         line = weight * best[j] + (1.0 - weight) * best[j + 1]
-        defect[j] = max(defect[j], line - cost - ahead[j + 1])
+        defect[j] = max(defect[j], line - cost - ahead[j + 1]) + 0.0
 
 
 @compiled()
@@ -142,7 +143,7 @@ def _switch_back(
                 below_kg = relaxation.floor_kg * (down - j)
                 value[m, j] = min(value[m, j], kg + best[n, 0] + below_kg)
             for j in range(bottom, top):
-                value[m, j] = min(value[m, j], kg + best[n, j - down])
+                value[m, j] = min(value[m, j], kg + best[n, j - down]) + 0.0
             for j in range(top, nodes):
                 value[m, j] = min(value[m, j], kg + best[n, nodes - 1])
 

@@ -12,14 +12,31 @@ from hevopt.problem.switching import Switching
 def block_minima(first: Indices, value: Array) -> tuple[Array, Indices]:
     """(time, mode) least value of each block and its entry; inf and -1 where the block is empty."""
     steps, modes = first.shape[0], first.shape[1] - 1
-    least = np.full((steps, modes), np.inf)
-    entry = np.full((steps, modes), -1, dtype=np.int64)
+    least, entry = np.empty((steps, modes)), np.empty((steps, modes), dtype=np.int64)
     for k in range(steps):
         for m in range(modes):
+            best, best_entry = np.inf, -1
             for i in range(first[k, m], first[k, m + 1]):
-                if value[i] < least[k, m]:
-                    least[k, m] = value[i]
-                    entry[k, m] = i
+                if value[i] < best:
+                    best, best_entry = value[i], i
+            least[k, m], entry[k, m] = best, best_entry
+    return least, entry
+
+
+@compiled()
+def priced_minima(choices: Choices, worth: Array, price: Array) -> tuple[Array, Indices]:
+    """As `block_minima`, of the choices' costs and (entry,) worths at a (time,) price."""
+    first, cost = choices.first, choices.cost_kg
+    steps, modes = first.shape[0], first.shape[1] - 1
+    least, entry = np.empty((steps, modes)), np.empty((steps, modes), dtype=np.int64)
+    for k in range(steps):
+        for m in range(modes):
+            best, best_entry = np.inf, -1
+            for i in range(first[k, m], first[k, m + 1]):
+                value = cost[i] + price[k] * worth[i]
+                if value < best:
+                    best, best_entry = value, i
+            least[k, m], entry[k, m] = best, best_entry
     return least, entry
 
 
@@ -49,6 +66,21 @@ def mode_path(least: Array, switching: Switching, price: Array) -> tuple[Array, 
 
 
 @compiled()
+def _followed(
+    least: Array, entry: Indices, switching: Switching, price: Array, start_mode: int
+) -> tuple[float, Indices, Array]:
+    """The shortest path over the least values of blocks, as `shortest_path` tells it."""
+    to_go, follow = mode_path(least, switching, price)
+    path = np.zeros(len(least), dtype=np.int64)
+    if np.isfinite(to_go[0, start_mode]):
+        mode = start_mode
+        for k in range(len(least)):
+            mode = follow[k, mode]
+            path[k] = entry[k, mode]
+    return to_go[0, start_mode], path, to_go
+
+
+@compiled()
 def shortest_path(
     choices: Choices, value: Array, price: Array, start_mode: int
 ) -> tuple[float, Indices, Array]:
@@ -57,11 +89,15 @@ def shortest_path(
     price: (time,) of the stored energy that switching takes before each step
     """
     least, entry = block_minima(choices.first, value)
-    to_go, follow = mode_path(least, choices.switching, price)
-    path = np.zeros(len(least), dtype=np.int64)
-    if np.isfinite(to_go[0, start_mode]):
-        mode = start_mode
-        for k in range(len(least)):
-            mode = follow[k, mode]
-            path[k] = entry[k, mode]
-    return to_go[0, start_mode], path, to_go
+    return _followed(least, entry, choices.switching, price, start_mode)
+
+
+@compiled()
+def priced_path(
+    choices: Choices, worth: Array, price: Array, before: Array, start_mode: int
+) -> tuple[float, Indices, Array]:
+    """As `shortest_path`, of the choices' costs and (entry,) worths at a (time,) price, without an array of their
+    sums. before: (time,) price of the stored energy that switching takes before each step
+    """
+    least, entry = priced_minima(choices, worth, price)
+    return _followed(least, entry, choices.switching, before, start_mode)

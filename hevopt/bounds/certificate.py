@@ -98,9 +98,9 @@ class Certificate(Shown):
 
         Raises SolverError where a proof contradicts the plan.
         """
-        bounds = self._bounds(plan.end_j)
+        bounds, rounding_kg = self._bounds(plan.end_j), _cost_rounding_kg(plan)
         for bound, kind in bounds:
-            if bound - plan.cost_kg > _cost_rounding_kg(plan):
+            if bound - plan.cost_kg > rounding_kg:
                 raise SolverError(
                     f"the proof contradicts a plan: by {kind} no plan that ends with its charge costs less than "
                     f"{bound:.12g} kg, and it costs {plan.cost_kg:.12g} kg; this is a fault of hevopt, not of "

@@ -8,9 +8,10 @@ be trusted, so the difference is told undivided. It is a warning, no proof.
 
 import numpy as np
 
-from hevopt.bounds.prices import bounded_choices, one_price_dual, one_price_lines
+from hevopt.bounds.bounded import undominated_bounded
+from hevopt.bounds.prices import one_price_dual, one_price_lines
 from hevopt.errors import InfeasibleError
-from hevopt.problem.choices import Choices, kept, without_dominated
+from hevopt.problem.choices import Choices, kept
 from hevopt.problem.flows import GivenFlows
 from hevopt.problem.problem import Problem
 
@@ -23,7 +24,7 @@ def coarseness_kg(problem: Problem) -> float | None:
     as of a car, or where no plan is left of them."""
     if problem.table.between or not isinstance(problem.table.flows, GivenFlows):
         return None
-    choices = without_dominated(bounded_choices(problem))
+    choices = undominated_bounded(problem)
     thinned = _every_second(choices)
     if len(thinned.cost_kg) == len(choices.cost_kg):
         return None

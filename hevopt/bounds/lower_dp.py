@@ -38,10 +38,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from hevopt.bounds import _lower_dp_kernels as kernels
-from hevopt.bounds.prices import EPSILON, bounded_choices, drain_magnitude_w, end_slack_j
+from hevopt.bounds.bounded import undominated_bounded
+from hevopt.bounds.prices import EPSILON, drain_magnitude_w, end_slack_j
 from hevopt.bounds.step_prices import line_above, steep, window_cells
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices, without_dominated
+from hevopt.problem.choices import Choices
 from hevopt.problem.problem import Problem
 
 _PIECES = 16
@@ -56,7 +57,7 @@ def lower_bound_kg(problem: Problem, price_kgpj: float, *, nodes: int) -> float:
 
     price_kgpj: about what stored energy is worth; it sets the slope of the relaxation, any value is valid.
     """
-    choices = without_dominated(bounded_choices(problem))
+    choices = undominated_bounded(problem)
     low, high = problem.battery.granted_window_j
     cell = (high - low) / (nodes - 1)
     # The asked end charge is a node, and the grid reaches up to a cell beyond the window: a relaxation.

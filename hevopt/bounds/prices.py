@@ -29,23 +29,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds._prices_kernels import priced_path, shortest_path
+from hevopt.bounds.bounded import bounded_choices, least_drain_j
 from hevopt.bounds.lines import Line, maximise
 from hevopt.display.facts import Shown
 from hevopt.errors import InfeasibleError
 from hevopt.problem import _battery_kernels as battery_kernels
-from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices, choices_of, kept
+from hevopt.problem.choices import Choices
 from hevopt.problem.frozen import frozen
 from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
-from hevopt.problem.switching import Switched, switched
+from hevopt.problem.switching import switched, switched_j
 
 EPSILON, TINY = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
-# A move this share beyond the window is beyond it, whatever rounding did to it.
-_WELL_BEYOND = 1e-6
 # Beyond this amplification a tangent's slope is not computed well enough to be of use.
 STEEPEST = 1e3
 
@@ -55,59 +53,27 @@ def end_slack_j(problem: Problem) -> float:
     return problem.battery.granted_window_j[1] - problem.window_j[1]
 
 
-def bounded_choices(problem: Problem) -> Choices:
-    """The choices that a bound must count: all but those that leave the window whatever the charge before.
-
-    A discharge drains at least what it does at the highest voltage and lowest resistance, a charge stores at least
-    what it does at the lowest and the highest: one that moves more than the window's width is in no plan.
-    """
-    choices, pack = choices_of(problem), problem.battery
-    inside, (low, high) = pack.within_window(), pack.granted_window_j
-    least_j = least_drain_j(problem, choices)
-    stored_w = battery_model.chemical_power_w(
-        pack, np.minimum(choices.power_w, 0.0), inside.open_circuit_v.min(), inside.charge_ohm.max()
-    )
-    stored_j = -stored_w * choices.spread(choices.step_s)
-    beyond = np.maximum(least_j, stored_j) > (high - low) * (1 + _WELL_BEYOND)
-    return kept(choices, ~beyond) if beyond.any() else choices
-
-
-def least_drain_j(problem: Problem, choices: Choices) -> Array:
-    """(entry,) fall of stored energy at the state of charge of the window that loses least."""
-    drain_w = np.empty_like(choices.power_w)
-    for charging in (False, True):
-        voltage, resistance = battery_model.best_voltage_and_resistance(problem.battery, charging)
-        part = (choices.power_w < 0) == charging
-        drain_w[part] = battery_model.chemical_power_w(
-            problem.battery, choices.power_w[part], voltage, resistance
-        )
-    return drain_w * choices.spread(choices.step_s)
-
-
-def drain_at_j(problem: Problem, choices: Choices, energy_j: float | Array) -> Array:
-    """(entry,) fall of stored energy at one stored energy, or at one per step, (time,)."""
-    pack = problem.battery
-    states = battery_model.states(pack, np.broadcast_to(energy_j, choices.steps))
-    voltage, discharge, charge = (choices.spread(state) for state in states[1:])
-    resistance = np.where(choices.power_w < 0, charge, discharge)
-    drain_w = battery_model.chemical_power_w(pack, choices.power_w, voltage, resistance)
-    return drain_w * choices.spread(choices.step_s)
-
-
 @once
 def one_price_dual(problem: Problem) -> tuple[Line, ...]:
     """Supporting lines of g up to its maximum, of the table's controls; the best one comes last."""
-    return tuple(one_price_lines(problem, bounded_choices(problem)))
+    return tuple(dual(problem, bounded_choices(problem), _bounded_at_one_price(problem.origin)))
+
+
+@once
+def _bounded_at_one_price(problem: Problem) -> "Priced":
+    """The priced part of `bounded_choices`, which no cost changes."""
+    return _at_one_price(problem, bounded_choices(problem))
 
 
 def one_price_lines(problem: Problem, choices: Choices) -> list[Line]:
     """The same of some choices, as of virtual.py."""
+    return dual(problem, choices, _at_one_price(problem, choices))
+
+
+def _at_one_price(problem: Problem, choices: Choices) -> "Priced":
     worth = least_drain_j(problem, choices)
     rounding = priced_rounding(problem, choices, np.ones(choices.steps), tangents=False)
-    priced = Priced(
-        worth, np.ones(choices.steps), problem.end_min_j - problem.start_j, 1.0, rounding
-    )
-    return dual(problem, choices, priced)
+    return Priced(worth, np.ones(choices.steps), problem.end_min_j - problem.start_j, 1.0, rounding)
 
 
 def before_steps(price: Array) -> Array:
@@ -214,8 +180,14 @@ class _Paths:
     def line(self, scale: float) -> Line:
         """g's supporting line at a scale."""
         priced = self.priced
-        value_kg = self.choices.cost_kg + scale * priced.worth
-        total, path = self._shortest(self.choices, value_kg, scale * priced.before)
+        total, path, _ = priced_path(
+            self.choices,
+            priced.worth,
+            np.full(self.choices.steps, scale),
+            scale * priced.before,
+            self.problem.start_mode,
+        )
+        self._check_open(total)
         end_price = scale * priced.end_price
         return Line(scale, total + scale * priced.constant, self._slope(path), end_price)
 
@@ -234,30 +206,30 @@ class _Paths:
         switching = self.choices.switching
         free = switching._replace(kg=frozen("switching", np.zeros_like(switching.kg)))
         choices = self.choices._replace(switching=free)
-        _, path = self._shortest(choices, self.priced.worth, self.priced.before)
+        total, path, _ = shortest_path(
+            choices, self.priced.worth, self.priced.before, self.problem.start_mode
+        )
+        self._check_open(total)
         slope = self._slope(path)
         # A plan that misses the end by no more than it may is one: g then rises without end, but slowly.
         if slope > self.priced.end_price * end_slack_j(self.problem):
             raise InfeasibleError(
                 "the end charge cannot be reached by any plan; ask for a lower soc_end or widen the window"
             )
-        return float(np.sum(self.choices.cost_kg[path] + self._switched(path).kg)), slope
+        control = self.choices.control[path]
+        switch_kg = switched(self.problem.table, self.problem.start_mode, control).kg
+        return float(np.sum(self.choices.cost_kg[path] + switch_kg)), slope
 
-    def _switched(self, path: Indices) -> Switched:
-        return switched(self.problem.table, self.problem.start_mode, self.choices.control[path])
-
-    def _shortest(
-        self, choices: Choices, value_kg: Array, before_kgpj: Array
-    ) -> tuple[float, Indices]:
-        total, path, _ = shortest_path(choices, value_kg, before_kgpj, self.problem.start_mode)
+    def _check_open(self, total: float) -> None:
         if not np.isfinite(total):
-            raise InfeasibleError(_no_path(choices, self.problem))
-        return total, path
+            raise InfeasibleError(_no_path(self.choices, self.problem))
 
     def _slope(self, path: Indices) -> float:
         priced = self.priced
         slope = float(np.sum(priced.worth[path])) + priced.constant
-        slope += float(np.sum(priced.before * self._switched(path).energy_j))
+        control = self.choices.control[path]
+        taken_j = switched_j(self.problem.table, self.problem.start_mode, control)
+        slope += float(np.sum(priced.before * taken_j))
         # End charge that is missing by rounding alone must not send the price to infinity.
         return 0.0 if abs(slope) <= priced.rounding_kg else slope
 

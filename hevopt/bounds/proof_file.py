@@ -26,10 +26,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hevopt.bounds.bounded import bounded_choices
 from hevopt.bounds.certificate import Certificate
 from hevopt.bounds.claim import Proof
 from hevopt.bounds.lower_dp import slope_kgpj
-from hevopt.bounds.prices import EPSILON, bounded_choices
+from hevopt.bounds.prices import EPSILON
 from hevopt.bounds.step_prices import CELLS, STRAIGHT
 from hevopt.bounds.virtual import split_of
 from hevopt.problem.battery import energy_j, states

@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hevopt.bounds._prices_kernels import shortest_path
+from hevopt.bounds._prices_kernels import priced_path
+from hevopt.bounds.bounded import drain_at_j, undominated_bounded
 from hevopt.bounds.lines import Line
-from hevopt.bounds.prices import bounded_choices, drain_at_j, one_price_dual
+from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import after_switching_j, costate_prices, dual_of_shape
 from hevopt.problem.arrays import Array
-from hevopt.problem.choices import Choices, without_dominated
+from hevopt.problem.choices import Choices
 from hevopt.problem.problem import Problem, Trajectory
 
 _CUTS_MAX = 60
@@ -56,7 +57,7 @@ def segment_dual(
     choices: those to count in place of the table's own, as of virtual.py
     beside: lines of other prices, the highest last; then lines of the mean of both are among those found
     """
-    own = without_dominated(bounded_choices(problem)) if choices is None else choices
+    own = undominated_bounded(problem) if choices is None else choices
     low, high = problem.window_j
     drain_j = drain_at_j(problem, own, np.clip(after_switching_j(rollout), low, high))
     found = segments(problem, own, drain_j, one_price_dual(problem)[-1].price_kgpj)
@@ -168,7 +169,7 @@ def _path(
     """The path of least cost at a price."""
     mode, energy_j = start
     every = np.full(part.steps, price_kgpj)
-    _, path, _ = shortest_path(part, part.cost_kg + price_kgpj * drain_j, every, mode)
+    _, path, _ = priced_path(part, drain_j, every, every, mode)
     modes = problem.table.mode[part.control[path]]
     before = np.concatenate([[mode], modes[:-1]])
     switched_j = part.switching.energy_j[part.switching.case, before, modes]

@@ -34,13 +34,13 @@ import numpy as np
 
 from hevopt.bounds import _step_prices_kernels as kernels
 from hevopt.bounds._step_prices_kernels import WindowCells
+from hevopt.bounds.bounded import undominated_bounded
 from hevopt.bounds.lines import Line, crossing_of
 from hevopt.bounds.prices import (
     EPSILON,
     STEEPEST,
     Priced,
     before_steps,
-    bounded_choices,
     dual,
     dual_at,
     priced_rounding,
@@ -50,7 +50,7 @@ from hevopt.problem import _battery_kernels as battery_kernels
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Flags, rising
-from hevopt.problem.choices import Choices, State, without_dominated
+from hevopt.problem.choices import Choices, State
 from hevopt.problem.problem import Problem, Trajectory
 
 CELLS = 256
@@ -121,7 +121,7 @@ def _priced(
         raise SolverError("the prices of stored energy are not all finite and >= 0")
     price = np.ldexp(price, -np.frexp(price.max())[1])
     if choices is None:
-        choices = without_dominated(bounded_choices(problem))
+        choices = undominated_bounded(problem)
     inside = problem.battery.within_window()
     line = line_above(inside)
     start = State(problem.start_mode, problem.start_j)
@@ -178,7 +178,7 @@ def lp_prices_kgpj(problem: Problem, rollout: Trajectory) -> Array:
     Long drives are given to it in parts, from the end. Each reaches into the next by some steps, counts what is
     left there at the price that the next has found for it, and is believed up to where the next begins.
     """
-    choices = without_dominated(bounded_choices(problem))
+    choices = undominated_bounded(problem)
     count = -(-choices.steps // _LP_STEPS)
     ends = [n * choices.steps // count for n in range(count + 1)]
     price = np.zeros(choices.steps)

@@ -70,6 +70,10 @@ class Choices(NamedTuple):
 @once
 def choices_of(problem: Problem) -> Choices:
     """All feasible controls of a problem, by step, mode and column; all who ask share them."""
+    if problem.origin is not problem:
+        shared = choices_of(problem.origin)
+        step = shared.spread(np.arange(shared.steps))
+        return shared._replace(cost_kg=problem.cost_kg[step, shared.control])
     table = problem.table
     modes = table.modes
     columns = np.argsort(table.mode, kind="stable")
@@ -152,3 +156,9 @@ def without_dominated(choices: Choices) -> Choices:
         cost_kg=choices.cost_kg[best],
         power_w=choices.power_w[best],
     )
+
+
+@once
+def undominated_choices(problem: Problem) -> Choices:
+    """Those of all feasible controls of a problem; all who ask share them."""
+    return without_dominated(choices_of(problem))

@@ -56,6 +56,7 @@ class Problem(Shown):
     start_j: float = field(init=False)
     end_min_j: float = field(init=False)
     window_j: tuple[float, float] = field(init=False)
+    _origin: "Problem | None" = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         low, high = self.battery.soc_min, self.battery.soc_max
@@ -112,8 +113,20 @@ class Problem(Shown):
         }
 
     def with_nox_weight(self, nox_weight: float) -> "Problem":
-        """The same problem with another objective."""
-        return replace(self, nox_weight=nox_weight)
+        """The same problem with another objective, which shares its `origin`."""
+        if nox_weight == self.nox_weight:
+            return self
+        weighted = replace(self, nox_weight=nox_weight)
+        object.__setattr__(weighted, "_origin", self.origin)
+        return weighted
+
+    @property
+    def origin(self) -> "Problem":
+        """The problem from which this one was made by another weight on NOx, or itself.
+
+        What no cost changes, such as from where an end charge can be reached, is worked out once for it.
+        """
+        return self if self._origin is None else self._origin
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -45,11 +45,17 @@ def room_for(nodes: int, entries: int) -> Room:
 def rises_of(value: Array, room: Room) -> None:
     """Fill the least and the greatest rise per cell of a cost-to-go (node,) over every _CELLS cells."""
     for block in range(len(room.least)):
-        low, high = np.inf, -np.inf
-        for c in range(block * _CELLS, min((block + 1) * _CELLS, len(value) - 1)):
-            rise = value[c + 1] - value[c]
+        begin, end = block * _CELLS, min((block + 1) * _CELLS, len(value) - 1)
+        # Each minimum waits for the one before: of two halves, only half as often.
+        low, low_too, high, high_too = np.inf, np.inf, -np.inf, -np.inf
+        for c in range(begin, end - 1, 2):
+            rise, next_rise = value[c + 1] - value[c], value[c + 2] - value[c + 1]
+            low, low_too = min(low, rise), min(low_too, next_rise)
+            high, high_too = max(high, rise), max(high_too, next_rise)
+        if (end - begin) % 2 == 1:
+            rise = value[end] - value[end - 1]
             low, high = min(low, rise), max(high, rise)
-        room.least[block], room.greatest[block] = low, high
+        room.least[block], room.greatest[block] = min(low, low_too), max(high, high_too)
 
 
 @compiled(bare=True)
@@ -80,6 +86,54 @@ def _beaten(one: int, other: int, rise: float, cost: Array, start: Array, after:
 
 
 @compiled(bare=True)
+def _rises_reached(
+    start: Array, after: Array, ends: tuple[int, int], nodes: int, penalty: Penalty, room: Room
+) -> tuple[float, float]:
+    """The greatest and the least rise per cell of all that entries lead to; 0 where no battery gives any."""
+    low, high = ends
+    bottom, top = np.inf, -np.inf
+    for i in range(len(start)):
+        if np.isfinite(start[i] + after[i]):
+            first, last = low + start[i], high + after[i]
+            bottom = min(bottom, min(first, last))
+            top = max(top, max(first, last))
+    if bottom > top:
+        return 0.0, 0.0
+    greatest: float = _extreme(1.0, room.greatest, bottom, top, nodes, penalty)
+    least: float = _extreme(-1.0, room.least, bottom, top, nodes, penalty)
+    return greatest, least
+
+
+@compiled(bare=True)
+def _likely(
+    cost: Array, start: Array, after: Array, rises: tuple[float, float], kept: Indices
+) -> int:
+    """Keep the entries that the best of them at either rise of the cost-to-go does not beat; how many these are.
+
+    rises: the greatest and the least of all that the entries lead to. What beats others is kept itself, and so is
+    what no battery gives.
+    """
+    (greatest, least), low, high = rises, -1, -1
+    at_low, at_high = np.inf, np.inf
+    for i in range(len(cost)):
+        gentle, dear = cost[i] + greatest * start[i], cost[i] + least * start[i]
+        if gentle < at_low:
+            at_low, low = gentle, i
+        if dear < at_high:
+            at_high, high = dear, i
+    high = min(high, low)
+    count = 0
+    for i in range(len(cost)):
+        beaten = False
+        if low >= 0:
+            other, rise = (low, greatest) if i > low else (high, least)
+            beaten = (i > low or i < high) and _beaten(i, other, rise, cost, start, after)
+        kept[count] = i
+        count += not beaten
+    return count
+
+
+@compiled(bare=True)
 def contenders(
     cost: Array,
     start: Array,
@@ -97,12 +151,14 @@ def contenders(
     greatest rise between where they lead, and higher by at most minus the least rise times that. One that costs
     more than that more than the other is the best nowhere: what holds at both ends of the nodes holds
     between them, where moves are linear. Beyond the grid, rises are those of the penalty. What no battery gives
-    (NaN) is kept, and beats nothing.
+    (NaN) is kept, and beats nothing. Most are beaten by the rises of all that the entries lead to, which are looked
+    for once; only the others ask for those between two.
     """
     low, high = ends
-    kept = room.kept
+    kept, rises = room.kept, _rises_reached(start, after, ends, nodes, penalty, room)
     count, other = 0, -1
-    for i in range(len(cost)):
+    for c in range(_likely(cost, start, after, rises, kept)):
+        i = kept[c]
         possible = np.isfinite(start[i] + after[i])
         if possible and other >= 0:
             bottom = min(low + start[i], high + after[i])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hevopt.bounds.prices import drain_at_j
+from hevopt.bounds.bounded import drain_at_j
 from hevopt.display.facts import Shown
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of, require_choices

@@ -4,11 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.bounds.prices import before_steps, drain_at_j
+from hevopt.bounds._prices_kernels import priced_path
+from hevopt.bounds.bounded import drain_at_j
+from hevopt.bounds.prices import before_steps
 from hevopt.problem import battery as battery_model
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import choices_of
+from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
 from hevopt.problem.simulation import total_cost_kg
 from hevopt.problem.switching import Switched, switched
@@ -37,9 +39,9 @@ class PricedDrives:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.choices = choices_of(problem)
-        self.bound_reach = reach_of(problem, self.choices, problem.end_min_j)
-        self.free_reach = reach_of(problem, self.choices, problem.window_j[0])
-        self.drain_j = drain_at_j(problem, self.choices, problem.start_j)
+        self.bound_reach = reach_of(problem, problem.end_min_j)
+        self.free_reach = reach_of(problem, problem.window_j[0])
+        self.drain_j = _drain_at_start_j(problem.origin)
         self.best_cost_kg = np.inf
         self.best_control, self.best_prices = np.empty(0, np.int64), (np.nan, np.nan)
 
@@ -79,9 +81,10 @@ class PricedDrives:
 
     def _to_go_kg(self, price_kgpj: Array) -> Array:
         """(time + 1, mode) cost to go under prices; 0 for a mode without a way on, into which no reach leads."""
-        priced = self.choices.cost_kg + self.choices.spread(price_kgpj) * self.drain_j
         before_kgpj = before_steps(price_kgpj)
-        _, _, to_go = shortest_path(self.choices, priced, before_kgpj, self.problem.start_mode)
+        _, _, to_go = priced_path(
+            self.choices, self.drain_j, price_kgpj, before_kgpj, self.problem.start_mode
+        )
         return np.where(np.isfinite(to_go), to_go, 0.0)
 
     def _tried(
@@ -98,6 +101,12 @@ class PricedDrives:
                 self.best_cost_kg, self.best_control = cost_kg, control
                 self.best_prices = float(price_kgpj[0]), float(price_kgpj[-1])
         return path, energy_j
+
+
+@once
+def _drain_at_start_j(problem: Problem) -> Array:
+    """(entry,) fall of stored energy at the start's, which no cost changes."""
+    return drain_at_j(problem, choices_of(problem), problem.start_j)
 
 
 def _of_step(price_kgpj: Array) -> Array:

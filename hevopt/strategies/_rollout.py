@@ -12,7 +12,8 @@ from hevopt.errors import InfeasibleError, SolverError
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import chemical_power_at
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices
+from hevopt.problem.choices import Choices, choices_of
+from hevopt.problem.once import once
 from hevopt.problem.problem import Problem
 from hevopt.strategies import _rollout_kernels as kernels
 from hevopt.strategies._reach_kernels import Reach, reachable
@@ -22,14 +23,23 @@ from hevopt.strategies._rollout_kernels import Grid
 _MOVES_PER_STEP = 500
 
 
-def reach_of(problem: Problem, choices: Choices, end_min_j: float) -> Reach:
+def reach_of(problem: Problem, end_min_j: float) -> Reach:
     """From where an end charge can be reached; InfeasibleError where the start is not among it."""
-    reach = reachable(choices, problem.window_j, end_min_j, problem.battery.arrays)
+    choices, known = choices_of(problem), _reaches(problem.origin)
+    if end_min_j not in known:
+        known[end_min_j] = reachable(choices, problem.window_j, end_min_j, problem.battery.arrays)
+    reach = known[end_min_j]
     mode, slack = problem.start_mode, 1e-12 * problem.window_j[1]
     least, greatest = reach.least_j[0, mode], reach.greatest_j[0, mode]
     if not least - slack <= problem.start_j <= greatest + slack:
         raise InfeasibleError(_why_unreachable(problem, choices, end_min_j))
     return reach
+
+
+@once
+def _reaches(problem: Problem) -> dict[float, Reach]:
+    """End charge -> from where it can be reached, which no cost changes."""
+    return {}
 
 
 def roll(

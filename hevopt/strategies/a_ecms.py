@@ -43,7 +43,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hevopt.bounds.prices import drain_at_j
+from hevopt.bounds.bounded import drain_at_j
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.choices import State, choices_of, require_choices, require_entry

@@ -22,14 +22,8 @@
 import numpy as np
 
 from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.bounds.prices import (
-    Priced,
-    before_steps,
-    drain_at_j,
-    dual,
-    one_price_dual,
-    step_maxima,
-)
+from hevopt.bounds.bounded import drain_at_j
+from hevopt.bounds.prices import Priced, before_steps, dual, one_price_dual, step_maxima
 from hevopt.errors import InfeasibleError
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.choices import Choices, choices_of
@@ -60,7 +54,7 @@ class _Rollouts:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.choices = choices_of(problem)
-        self.reach: Reach = reach_of(problem, self.choices, problem.end_min_j)
+        self.reach: Reach = reach_of(problem, problem.end_min_j)
         self.best_cost_kg, self.best_control = np.inf, np.empty(0, np.int64)
 
     def follow(self, solution: Solution) -> Indices:

@@ -27,7 +27,7 @@ from hevopt.bounds.prices import TINY, one_price_dual, typical_price_kgpj
 from hevopt.bounds.step_prices import costate_bound_kg
 from hevopt.errors import DataError, SolverError
 from hevopt.problem.arrays import Array, Indices
-from hevopt.problem.choices import Choices, choices_of, without_dominated
+from hevopt.problem.choices import Choices, choices_of, undominated_choices
 from hevopt.problem.problem import Plan, Problem
 from hevopt.problem.simulation import simulate, total_cost_kg
 from hevopt.problem.switching import switched
@@ -82,11 +82,11 @@ def solve(
     if not 3 <= nodes <= _NODES_MAX:
         raise DataError(f"energy nodes {nodes}; allowed: 3 to {_NODES_MAX}")
     every = choices_of(problem)
-    reach = reach_of(problem, every, problem.end_min_j)
+    reach = reach_of(problem, problem.end_min_j)
     price = one_price_dual(problem)[-1].price_kgpj
     worth = max(price, 0.01 * typical_price_kgpj(every, every.power_w))
     gentle = _Setting(
-        problem, every, without_dominated(every), reach, _GENTLE * worth, hard_top=False
+        problem, every, undominated_choices(problem), reach, _GENTLE * worth, hard_top=False
     )
     notes = {"price_kgpj": price, "nodes": nodes}
     if enough_gap > 0 and refine:

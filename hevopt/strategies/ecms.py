@@ -15,7 +15,8 @@ followed.
 
 import numpy as np
 
-from hevopt.bounds.prices import drain_at_j, one_price_dual, typical_price_kgpj
+from hevopt.bounds.bounded import drain_at_j
+from hevopt.bounds.prices import one_price_dual, typical_price_kgpj
 from hevopt.bounds.segments import binds, segments
 from hevopt.problem.problem import Plan, Problem
 from hevopt.strategies._priced_drives import PricedDrive, PricedDrives

@@ -12,7 +12,7 @@ member of least charge-corrected cost among those whose end charge is near the a
 
 import numpy as np
 
-from hevopt.bounds.prices import drain_at_j
+from hevopt.bounds.bounded import drain_at_j
 from hevopt.errors import DataError
 from hevopt.problem.arrays import Array, Indices
 from hevopt.problem.battery import energy_j, soc

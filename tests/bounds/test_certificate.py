@@ -7,7 +7,15 @@ import pytest
 from conftest import HYBRIDS
 from problems import every_plan, random_problem
 
-from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
+from hevopt import (
+    InfeasibleError,
+    build_problem,
+    certify,
+    load_architecture,
+    load_cycle,
+    simulate,
+    solve,
+)
 from hevopt.bounds.claim import Claim, Proof, Scope
 from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
@@ -15,6 +23,26 @@ from hevopt.bounds.step_prices import costate_dual, dual_of_shape, lp_dual
 from hevopt.strategies import dp
 
 ROUNDING = 1 + 1e-12
+
+
+@pytest.mark.parametrize("seed", range(2000, 2012))
+def test_problems_of_several_weights_share_what_each_finds_alone(seed):
+    first = random_problem(seed)
+    assert first.with_nox_weight(first.nox_weight) is first
+    for weight in (0.0, 3.0, 40.0):
+        shared, alone = first.with_nox_weight(weight), replace(first, nox_weight=weight)
+        assert shared.origin is first and alone.origin is alone
+        found = [_found(problem) for problem in (shared, alone)]
+        assert found[0] == found[1], weight
+
+
+def _found(problem):
+    try:
+        plans = [solve(problem, name).control.tolist() for name in ("dp", "ecms")]
+    except InfeasibleError as error:
+        return str(error)
+    lines = certify(problem, simulate(problem, plans[0])).proofs
+    return plans, {kind: [line.value_kg for line in of] for kind, of in lines.items()}
 
 
 @pytest.mark.parametrize(

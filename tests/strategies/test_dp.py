@@ -76,6 +76,19 @@ def test_choices_left_out_are_the_best_nowhere(seed, share):
     compare_with_twin(random_problem(seed, 60), 0.0, True, 1e-9, share)
 
 
+@pytest.mark.parametrize("share", [0.02, 0.9])
+def test_of_choices_that_are_alike_one_is_tried(share):
+    problem = random_problem(3, 20)
+    table, twice = problem.table, np.repeat(np.arange(problem.table.mode.size), 2)
+    columns = {
+        name: getattr(table, name)[:, twice]
+        for name in ("fuel_kg", "nox_kg", "battery_power_w", "reject")
+    }
+    controls = tuple(table.controls[c] for c in twice)
+    doubled = replace(table, **columns, mode=table.mode[twice], controls=controls)
+    compare_with_twin(replace(problem, table=doubled), 0.0, True, 1e-9, share)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_linear_moves_agree_with_the_exact_step_to_their_curvature(seed):
     compare_with_twin(random_problem(seed), 0.0, False, 5e-3)

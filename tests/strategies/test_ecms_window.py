@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hevopt import build_problem, certify, load_architecture, load_cycle, simulate, solve
-from hevopt.bounds.prices import drain_at_j
+from hevopt.bounds.bounded import drain_at_j
 from hevopt.bounds.segments import segments
 from hevopt.problem.choices import choices_of
 from hevopt.strategies import ecms

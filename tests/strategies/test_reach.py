@@ -58,7 +58,7 @@ def test_a_straight_value_on_two_nodes_or_many_is_followed_alike_round_dead_ends
     # A window of a few steps' energy, in which greed runs into dead ends.
     problem = Problem(table, Battery([0, 1], [100, 100], [0, 0], [0, 0], 40.0), 0.5, 0.5)
     choices, (low, high) = choices_of(problem), problem.window_j
-    reach = reach_of(problem, choices, problem.end_min_j)
+    reach = reach_of(problem, problem.end_min_j)
     followed = []
     for nodes in (2, 5):
         stored = np.linspace(low, high, nodes)
