@@ -4,6 +4,7 @@
     ├── DataError          2   an input file, a name or an option is wrong
     │   └── UnknownNoxError 2   NOx is asked of an engine without NOx data
     ├── InfeasibleError    3   nothing can follow the cycle, or keep the charge within its limits
+    │   └── EndChargeError 3   nothing reaches the end charge that is asked
     └── SolverError        3   a solver did not return what it promised
 
 Sweeps add WorkersLost, 4: their processes end faster than they work, or do not start.
@@ -99,6 +100,17 @@ class InfeasibleError(HevoptError):
     """The problem has no solution, with the first step at which that shows."""
 
     exit_status = 3
+
+
+class EndChargeError(InfeasibleError):
+    """No plan reaches the end charge that is asked; reachable_soc: the most that any reaches."""
+
+    def __init__(self, message: str, reachable_soc: float) -> None:
+        super().__init__(message, reachable_soc)
+        self.reachable_soc = reachable_soc
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 class SolverError(HevoptError):

@@ -1,7 +1,7 @@
 """A car driven along a trace by a driver at the pedals, engine and gears by a plan."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -117,6 +117,14 @@ class ForwardRun(Shown):
         for name, values in self.books.residuals.items():
             found[name] = float(np.abs(values).sum()) / max(through, 1e-9)
         return found
+
+    def against(self, cycle: Cycle) -> "ForwardRun":
+        """The run held against another trace of the same times, of which the driver followed what he could."""
+        if cycle is self.cycle:
+            return self
+        wanted = np.interp(self.time_s, cycle.time_s, cycle.speed_mps)
+        quality = drive_quality(self.car.vehicle, self.time_s, self.speed_mps, wanted)
+        return replace(self, cycle=cycle, wanted_mps=wanted, quality=quality)
 
     def _facts(self) -> dict[str, object]:
         return {

@@ -125,8 +125,7 @@ def notes(driven: DrivenPlan) -> str:
         f"at full load {run.full.sum() * run.step_s:.1f} s; "
         f"distance {run.distance_m - run.cycle.distance_m:+.2f} m; "
         f"charge at the end {driven.charge_error:+.4f} against the backward run's",
-        f"forward against backward, {compared(driven)}: {driven.change_percent:+.2f} %; by kind of step: "
-        + ", ".join(f"{kind} {value:+.2f} %" for kind, value in driven.difference_percent.items()),
+        change_text(driven),
         *([] if run.car.electric else [_BOUND_NOTE]),
         "energy that does not add up, as a share of what passed the wheels: "
         + ", ".join(f"{name} {value:.0e}" for name, value in run.residual.items()),
@@ -134,9 +133,18 @@ def notes(driven: DrivenPlan) -> str:
     return "\n".join(lines)
 
 
+def change_text(driven: DrivenPlan) -> str:
+    """How far the run is from its backward twin, and by which kinds of steps."""
+    said = f"forward against backward, {compared(driven)}"
+    if driven.change_percent is None:
+        return f"{said}: no share can be told, as the backward run took none"
+    parts = ", ".join(f"{kind} {value:+.2f} %" for kind, value in driven.difference_percent.items())
+    return f"{said}: {driven.change_percent:+.2f} %; by kind of step: {parts}"
+
+
 def compared(driven: DrivenPlan) -> str:
     """What of a run stands against its backward twin's."""
-    return "energy from the battery" if driven.run.car.electric else "charge-corrected"
+    return "charge-corrected" if driven.burns else "energy from the battery"
 
 
 def how_text(driven: DrivenPlan) -> str:

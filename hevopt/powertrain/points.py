@@ -5,7 +5,7 @@ of its gears every point that it asks for, so that a cruise is met exactly, and 
 acceleration is that of a level road, its switching that of its own mean speed, and no gear is changed in it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +14,10 @@ from hevopt.car.architecture import Architecture
 from hevopt.car.vehicle import tractive_force_n
 from hevopt.display.facts import Shown
 from hevopt.driving.demand import Demand
+from hevopt.errors import InfeasibleError
 from hevopt.powertrain._points_kernels import nearest
-from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_table
+from hevopt.powertrain.branches import branches
+from hevopt.powertrain.powertrain import TORQUE_LEVELS, build_table, lowered, stuck_steps
 from hevopt.problem.arrays import Array
 from hevopt.problem.dwell import with_dwell
 from hevopt.problem.problem import Problem
@@ -25,6 +27,9 @@ SPEED_STEP_MPS, TORQUE_STEP_NM = 1.0, 30.0
 # Cells of the grid beyond what the cycle asks for in a gear.
 _BEYOND = 2
 _BROADEST = 400
+_OF_A_ROW = (
+    "step_s", "speed_mps", "wheel_torque_nm", "wheel_speed_radps", "wheel_accel_radps2", "gear", "clutch_open",
+)  # fmt: skip
 
 
 class GearRows(NamedTuple):
@@ -59,7 +64,11 @@ def points_of(car: Architecture, problem: Problem, levels: int = TORQUE_LEVELS) 
     assert signals is not None  # build_problem gives them
     step_s = float(np.median(problem.table.step_s))
     by_gear, demand = _rows(car, signals, step_s)
-    table = build_table(car, demand, levels=levels, allow_shortfall=True, apart=True)
+    try:
+        table = build_table(car, demand, levels=levels, allow_shortfall=True, apart=True)
+    except InfeasibleError:
+        by_gear, demand = _known(car, by_gear, demand, levels)
+        table = build_table(car, demand, levels=levels, allow_shortfall=True, apart=True)
     rows = Problem(
         table, problem.battery, problem.soc_start, problem.soc_end_min, 0, problem.nox_weight
     )
@@ -90,6 +99,25 @@ def _rows(car: Architecture, signals: Signals, step_s: float) -> tuple[dict[int,
         begins, np.full(len(speed), step_s), speed, torque, speed / radius, accel / radius,
         np.concatenate(gear_of), np.zeros(len(speed), dtype=bool),
     )  # fmt: skip
+
+
+def _known(
+    car: Architecture, by_gear: dict[int, GearRows], demand: Demand, levels: int
+) -> tuple[dict[int, GearRows], Demand]:
+    """The rows that have a control: a grid's end may be faster than a part turns."""
+    _, found, _ = lowered(car, demand, branches(car, demand, levels, None), levels)
+    stuck = stuck_steps(found)
+    rows, kept, first = {}, [], 0
+    for gear, of in by_gear.items():
+        moving = of.first + 1 + np.arange(len(of.speed_mps))
+        known = ~stuck[moving]
+        rows[gear] = GearRows(first, of.speed_mps[known], of.wheel_nm[known])
+        kept.append(np.append(of.first, moving[known]))
+        first += len(kept[-1])
+    left = np.concatenate(kept)
+    begins = demand.time_s[: len(left)]
+    arrays = {name: getattr(demand, name)[left] for name in _OF_A_ROW}
+    return rows, replace(demand, time_s=begins, **arrays)
 
 
 def _of_gear(first: int, speed_mps: Array, wheel_nm: Array) -> GearRows:

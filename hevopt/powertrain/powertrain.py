@@ -29,9 +29,9 @@ from hevopt.problem.problem import Problem, Trajectory
 from hevopt.problem.table import Control, ControlTable, Signals
 
 TORQUE_LEVELS = 41
-_SHORTFALL_PASSES = 5
-# Share of the demand by which a step is lowered where limits lie between gridded controls.
-_STEP_DOWN = 0.03
+# Shares of the demand by which a step is lowered, pass by pass, where limits lie between controls: a little, and
+# where that is not enough ever more, up to all of it.
+_STEPS_DOWN = (0.03, 0.03, 0.03, 0.03, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 
 
 def build_problem(
@@ -79,27 +79,43 @@ def build_table(
     if not 2 <= levels <= 2001:
         raise DataError(f"torque levels {levels}; allowed: 2 to 2001")
     found = branches(architecture, demand, levels, around)
-    stuck = _stuck(found)
-    missing = np.zeros(len(demand.time_s))
+    stuck, missing = stuck_steps(found), np.zeros(len(demand.time_s))
+    if stuck.any() and allow_shortfall:
+        demand, found, missing = lowered(architecture, demand, found, levels, around)
+        stuck = stuck_steps(found)
     if stuck.any():
-        missing = _missing_nm(architecture, demand, found, stuck)
-        if allow_shortfall:
-            more = missing
-            # With less torque a launch is at a lower speed, where a map may cover less again.
-            for _ in range(_SHORTFALL_PASSES):
-                demand = demand.with_torque(demand.wheel_torque_nm - more)
-                found = branches(architecture, demand, levels, around)
-                stuck = _stuck(found)
-                more = _missing_nm(architecture, demand, found, stuck)
-                if not more.any():
-                    break
-                missing = missing + more
-        if stuck.any():
-            missing = np.zeros_like(missing) if allow_shortfall else missing
-            raise InfeasibleError(
-                shortfall_message(architecture, demand, stuck, missing, _rejects(found))
-            )
+        lacking = np.zeros_like(missing)
+        if not allow_shortfall:
+            lacking = _missing_nm(architecture, demand, found, stuck, _STEPS_DOWN[0])
+        raise InfeasibleError(
+            shortfall_message(architecture, demand, stuck, lacking, _rejects(found))
+        )
     return _assemble(architecture, demand, found, missing, apart=apart)
+
+
+def lowered(
+    architecture: Architecture, demand: Demand, found: list[Branch], levels: int, around: Around | None = None
+) -> tuple[Demand, list[Branch], Array]:  # fmt: skip
+    """The demand with what the powertrain can give at steps without a control, its branches, and what is missing.
+
+    found: the branches of the demand as it is. Where no torque at all helps, a step is left without a control.
+    """
+    stuck, missing = stuck_steps(found), np.zeros(len(demand.time_s))
+    # With less torque a launch is at a lower speed, where a map may cover less again.
+    for share in _STEPS_DOWN:
+        more = _missing_nm(architecture, demand, found, stuck, share)
+        if share > _STEPS_DOWN[0]:
+            least = share * np.maximum(demand.wheel_torque_nm, 0.0)
+            more = np.where(stuck, np.maximum(more, least), 0.0)
+        if not more.any():
+            continue
+        missing = missing + more
+        demand = demand.with_torque(demand.wheel_torque_nm - more)
+        found = branches(architecture, demand, levels, around)
+        stuck = stuck_steps(found)
+        if not stuck.any():
+            break
+    return demand, found, missing
 
 
 def around_plan(trajectory: Trajectory, table: ControlTable, share: float) -> Around:
@@ -129,19 +145,23 @@ def _rejects(found: list[Branch]) -> Bits:
 
 
 def _missing_nm(
-    architecture: Architecture, demand: Demand, found: list[Branch], stuck: Flags
+    architecture: Architecture, demand: Demand, found: list[Branch], stuck: Flags, share: float
 ) -> Array:
-    """(time,) wheel torque beyond what any state delivers at the steps without a control; else 0."""
+    """(time,) wheel torque beyond what any state delivers at the steps without a control; else 0.
+
+    share: of the demand, the least of it where controls are gridded
+    """
     limits = [deliverable_nm(architecture, branch, stuck) for branch in found]
     short = demand.wheel_torque_nm - np.max(limits, axis=0)
     missing: Array = np.where(stuck, np.maximum(short, 0.0), 0.0)
     if any(branch.points for branch in found):
-        least = _STEP_DOWN * np.maximum(demand.wheel_torque_nm, 0.0)
+        least = share * np.maximum(demand.wheel_torque_nm, 0.0)
         missing = np.where(stuck, np.maximum(missing, least), 0.0)
     return missing
 
 
-def _stuck(found: list[Branch]) -> Flags:
+def stuck_steps(found: list[Branch]) -> Flags:
+    """(time,) steps without a control."""
     drivable: Flags = np.any([(branch.reject == 0).any(axis=1) for branch in found], axis=0)
     return ~drivable
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hevopt.errors import InfeasibleError, SolverError
+from hevopt.errors import EndChargeError, InfeasibleError, SolverError
 from hevopt.problem import battery as battery_model
 from hevopt.problem._battery_kernels import chemical_power_at
 from hevopt.problem.arrays import Array, Indices
@@ -32,7 +32,7 @@ def reach_of(problem: Problem, end_min_j: float) -> Reach:
     mode, slack = problem.start_mode, 1e-12 * problem.window_j[1]
     least, greatest = reach.least_j[0, mode], reach.greatest_j[0, mode]
     if not least - slack <= problem.start_j <= greatest + slack:
-        raise InfeasibleError(_why_unreachable(problem, choices, end_min_j))
+        raise _why_unreachable(problem, choices, end_min_j)
     return reach
 
 
@@ -89,8 +89,8 @@ def follow(
     )
 
 
-def _why_unreachable(problem: Problem, choices: Choices, end_min_j: float) -> str:
-    """The first step at which nothing is left, and why, going forward from the start."""
+def _why_unreachable(problem: Problem, choices: Choices, end_min_j: float) -> InfeasibleError:
+    """The error with the first step at which nothing is left, and why, going forward from the start."""
     low, high = problem.window_j
     bottom = np.full(choices.modes, np.inf)
     top = np.full(choices.modes, -np.inf)
@@ -98,24 +98,25 @@ def _why_unreachable(problem: Problem, choices: Choices, end_min_j: float) -> st
     for k in range(choices.steps):
         moved = _advance(problem, choices, k, bottom, top)
         if not (moved[0] <= moved[1]).any():
-            return _reason_at(problem, choices, k)
+            return InfeasibleError(_reason_at(problem, choices, k))
         bottom, top = np.maximum(moved[0], low), np.minimum(moved[1], high)
         gone = bottom > top
         bottom, top = np.where(gone, np.inf, bottom), np.where(gone, -np.inf, top)
         if gone.all():
-            return _reason_at(problem, choices, k)
+            return InfeasibleError(_reason_at(problem, choices, k))
     best = float(battery_model.soc(problem.battery, top.max()))
     wanted = float(battery_model.soc(problem.battery, end_min_j))
     if top.max() >= end_min_j:
         lowest, highest = (float(battery_model.soc(problem.battery, e)) for e in problem.window_j)
-        return (
+        return InfeasibleError(
             f"no path was found that keeps within the SOC window {lowest:.6g} to {highest:.6g} and ends at SOC "
             f"{wanted:.6g} or above, though each step alone allows one: steps move about as much as the window "
             "holds; widen it, or ask for a lower soc_end"
         )
-    return (
+    return EndChargeError(
         f"the end charge cannot be reached: SOC {wanted:.4f} is asked, {best:.4f} is the most any plan "
-        f"reaches at the last step {choices.steps - 1}; ask for a lower soc_end or give the machine more power"
+        f"reaches at the last step {choices.steps - 1}; ask for a lower soc_end or give the machine more power",
+        best,
     )
 
 

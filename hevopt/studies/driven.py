@@ -15,13 +15,14 @@ from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.asked import Asking, follow_asked
 from hevopt.forward.breathing import EngineModel, check_steady
 from hevopt.forward.lines import line_of
-from hevopt.forward.plans import replay_of
+from hevopt.forward.plans import replay_of, signals_of
 from hevopt.forward.run import STEP_S, ForwardRun, check_step, follow, whole_handling
 from hevopt.problem.arrays import Array, Flags
 from hevopt.problem.problem import Trajectory
 from hevopt.strategies import strategy_named
-from hevopt.studies.case import Case, prepare
+from hevopt.studies.case import Case
 from hevopt.studies.deciding import decider_of, decides
+from hevopt.studies.planned import PlannedCase, planned_for
 from hevopt.studies.rows import Row, is_neutral
 from hevopt.studies.settings import Settings
 from hevopt.studies.solved import check_horizon, run_case
@@ -57,7 +58,8 @@ class DrivenPlan(Shown):
     electricity_kwh_per_100km: stored energy that the way driven took from the battery
     difference_percent: kind of step -> forward less backward, charge-corrected, as a share of backward's; and what
     the way driven counts beside the trace's, as figures are per distance: the sum is change_percent
-    Without an engine there is neither corrected fuel nor its bound, and what differs is the stored energy taken.
+    Without an engine there is neither corrected fuel nor its bound, and what differs is the stored energy taken; so
+    it is where neither run burns anything. difference_percent is empty where the twin took nothing to compare with.
     marks: what is to be known of the run beside its figures
     asked: how the strategy was asked on the way; None where its plan was replayed
     """
@@ -76,12 +78,21 @@ class DrivenPlan(Shown):
     asked: Asking | None = None
 
     @property
-    def change_percent(self) -> float:
-        """Charge-corrected fuel against the backward twin's; without an engine the energy from the battery."""
+    def burns(self) -> bool:
+        """Whether fuel is what the run and its twin are compared by, and not the energy from the battery."""
+        burnt = self.run.fuel_kg > 0 or (self.backward.fuel_l_per_100km or 0.0) > 0
+        return burnt and not self.run.car.electric
+
+    @property
+    def change_percent(self) -> float | None:
+        """Charge-corrected fuel against the backward twin's; where nothing burns the energy from the battery.
+
+        None where the twin took none, as down a long slope.
+        """
         own, twin = self.corrected_l_per_100km, self.backward.fuel_corrected_l_per_100km
-        if self.run.car.electric:
+        if not self.burns:
             own, twin = self.electricity_kwh_per_100km, self.backward.electricity_kwh_per_100km
-        return 100 * (own / twin - 1) if own is not None and twin else float("nan")
+        return 100 * (own / twin - 1) if own is not None and twin is not None and twin > 0 else None
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -112,7 +123,8 @@ def drive(
     asking: how often a strategy decides that can on the way; replay: its plan is driven, as that of all others and
     of a car without an engine is, which leaves nothing to decide
     engine_model: "map", or "mean_value", which drives with the air that the engine has and whose fuel counts
-    A trace that is missed is driven on, and the run says where. DataError for what cannot be driven forward.
+    A trace that is missed is driven on, and the run says where; so is one that no plan follows, as fast as one can.
+    DataError for what cannot be driven forward, InfeasibleError where a plan is needed and none there.
     """
     settings = replace(settings or Settings(), allow_shortfall=True)
     check_horizon(settings.horizon_s, [strategy])
@@ -121,10 +133,10 @@ def drive(
     check_steady(car, engine_model)
     check_step(step_s, whole_handling(car, handling))
     line_of(car)
-    case = prepare(car, cycle, settings)
-    row, _, trajectory = run_case(case, strategy, settings.horizon_s)
+    planned = planned_for(car, cycle, settings)
+    row, _, trajectory = run_case(planned.case, strategy, settings.horizon_s)
     how = Manner(step_s, handling, asking, replay, engine_model)
-    return drive_solved(case, strategy, settings.horizon_s, (row, trajectory), how)
+    return _drive(planned, cycle, strategy, settings.horizon_s, (row, trajectory), how)
 
 
 def drive_solved(
@@ -135,7 +147,15 @@ def drive_solved(
     how: Manner,
 ) -> DrivenPlan:
     """A case that a strategy has solved, with its row and trajectory, driven forward."""
-    car, (row, trajectory), line = case.car, solved, line_of(case.car)
+    return _drive(PlannedCase(case), case.cycle, strategy, horizon_s, solved, how)
+
+
+def _drive(
+    planned: PlannedCase, cycle: Cycle, strategy: str, horizon_s: float | None, solved: tuple[Row, Trajectory],
+    how: Manner,
+) -> DrivenPlan:  # fmt: skip
+    case, (row, trajectory) = planned.case, solved
+    car, line = case.car, line_of(case.car)
     asked = None
     if how.replay or not decides(strategy) or car.electric:
         plan = replay_of(trajectory, line)
@@ -150,8 +170,10 @@ def drive_solved(
             car, case.cycle, decider, trajectory,
             step_s=how.step_s, handling=how.handling, line=line, engine_model=how.engine_model,
         )  # fmt: skip
+    run = run.against(cycle)
     _check_moved(run)
-    return beside(case, strategy, row, trajectory, run, asked=asked)
+    found = beside(case, strategy, row, trajectory, run, asked=asked)
+    return replace(found, marks=planned.marks + found.marks) if planned.marks else found
 
 
 def beside(
@@ -181,11 +203,15 @@ def beside(
         None if car.electric else litres(run.fuel_kg - price * surplus_j),
         None if car.electric else litres(case.certificate.bound_kg(end_j)[0]),
         run.nox_kg * 1e6 / km if car.engine.nox_known else None,
-        _difference(trajectory, run, 1.0 if car.electric else price),
+        _difference(trajectory, run, price if _burn(trajectory, run) else None),
         float(run.soc[-1] - np.interp(run.time_s[-1], case.cycle.time_s, trajectory.soc)),
         _marks(case, run, surplus_j),
         asked,
     )
+
+
+def _burn(trajectory: Trajectory, run: ForwardRun) -> bool:
+    return not run.car.electric and (run.fuel_kg > 0 or trajectory.total_fuel_kg > 0)
 
 
 def _check_moved(run: ForwardRun) -> None:
@@ -214,11 +240,20 @@ def _marks(case: Case, run: ForwardRun, surplus_j: float) -> tuple[str, ...]:
     return tuple(marks)
 
 
-def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> dict[str, float]:
+def _difference(
+    trajectory: Trajectory, run: ForwardRun, price_kgpj: float | None
+) -> dict[str, float]:
     """Charge-corrected fuel, forward less backward, by kind of step and way, in per cent of the backward one's.
 
-    price_kgpj: what a joule taken from the battery counts; anything without an engine, where nothing else does
+    price_kgpj: what a joule taken from the battery counts; None where nothing burns and that energy is compared
+    Nothing where the backward one is none.
     """
+    asked_j = trajectory.problem.end_min_j
+    if price_kgpj is None:
+        price_kgpj, asked_j = 1.0, float(trajectory.energy_j[0])
+    total = trajectory.total_fuel_kg - price_kgpj * (trajectory.end_j - asked_j)
+    if total <= 0:
+        return {}
     table, flows, books = trajectory.problem.table, trajectory.flows, run.books.flows
     times = np.append(table.time_s, table.time_s[-1] + table.step_s[-1])
 
@@ -234,18 +269,15 @@ def _difference(trajectory: Trajectory, run: ForwardRun, price_kgpj: float) -> d
     drained_j = flows["battery_chemical_w"] * table.step_s + trajectory.switch_energy_j
     backward = trajectory.fuel_kg + price_kgpj * drained_j
     kinds = kinds_of(trajectory, run, times)
-    asked_j = trajectory.energy_j[0] if run.car.electric else trajectory.problem.end_min_j
-    total = trajectory.total_fuel_kg - price_kgpj * (trajectory.end_j - asked_j)
-    gap = 100 * (forward - backward) / total if total > 0 else forward * np.nan
+    gap = 100 * (forward - backward) / total
     found = {kind: float(np.sum(gap[kinds == n])) for n, kind in enumerate(KINDS)}
-    per_way = run.cycle.distance_m / run.distance_m
+    per_way = float(np.sum(signals_of(table).speed_mps * table.step_s)) / run.distance_m
     return found | {WAY: (100 + float(np.sum(gap))) * (per_way - 1)}
 
 
 def kinds_of(trajectory: Trajectory, run: ForwardRun, times: Array) -> Array:
     """(time,) number of each step's kind."""
-    signals = trajectory.problem.table.signals
-    assert signals is not None  # replay_of has asked for them
+    signals = signals_of(trajectory.problem.table)
     books = run.books.flows
 
     def anywhere(where: Flags) -> Flags:

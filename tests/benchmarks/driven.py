@@ -57,10 +57,10 @@ def table(cars: list[str], worst: dict[str, Worst]) -> Iterator[str]:
                     worst.get(name, Worst(0.0, "")), Worst(share, f"{car} on {cycle}")
                 )
             largest = max(residual, key=lambda name: residual[name])
-            fuel = found.corrected_l_per_100km
+            fuel, change = found.corrected_l_per_100km, found.change_percent
             yield (
                 f"| {car} | {cycle} | {'' if fuel is None else f'{fuel:.3f}'} | "
-                f"{found.electricity_kwh_per_100km:.2f} | {found.change_percent:+.2f} | "
+                f"{found.electricity_kwh_per_100km:.2f} | {'' if change is None else f'{change:+.2f}'} | "
                 f"{3.6 * run.quality.speed_error_mps:.3f} | {len(run.quality.violations)} | "
                 f"{largest} {residual[largest]:.0e} | {', '.join(found.marks)} |"
             )

@@ -101,6 +101,6 @@ def test_without_an_engine_no_column_of_fuel_is_shown():
     ],
 )
 def test_what_cannot_be_driven_is_told_before_anything_is_solved(options, message, monkeypatch):
-    monkeypatch.setattr("hevopt.studies.driven.prepare", lambda *_: pytest.fail("it is solved"))
+    monkeypatch.setattr("hevopt.studies.planned.prepare", lambda *_: pytest.fail("it is solved"))
     with pytest.raises(DataError, match=message):
         drive(load_architecture("C2"), load_cycle("nedc"), **options)
