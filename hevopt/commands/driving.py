@@ -1,7 +1,7 @@
 """`hevopt drive` and `hevopt performance`: cars driven forward, along a trace and at full pedal."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -9,6 +9,9 @@ from hevopt.commands.options import ArchitectureArgument, CycleOption, JsonOptio
 from hevopt.commands.reporting import check_ending, check_page, command_line
 from hevopt.commands.terminal import Progress, show, write
 from hevopt.errors import DataError, InfeasibleError
+
+if TYPE_CHECKING:
+    from hevopt.car.architecture import Architecture
 
 EngineModelOption = Annotated[
     Literal["map", "mean_value"],
@@ -144,7 +147,7 @@ def performance(
             progress(car.name, n, len(loaded))
             shifting = None if gap is None else shifting_of(car)._replace(gap_s=gap)
             handling = car.handling._replace(shifting=shifting or car.handling.shifting)
-            for how in manners(engine_model, boost and "e_boost" in car.functions):
+            for how in manners(car, engine_model, boost and "e_boost" in car.functions):
                 lag = boost_lag if how["engine_model"] == "map" else 0.0
                 found.append(
                     figures_of(car, **how, added_kg=added_mass, boost_lag_s=lag, handling=handling)
@@ -179,15 +182,19 @@ def performance(
         write(f"page written to {report}")
 
 
-def manners(engine_model: str, boost: bool) -> list[dict[str, Any]]:
-    """How a car is driven, line by line: steady map and mean-value engine, alone and with its machine."""
+def manners(car: "Architecture", engine_model: str, boost: bool) -> list[dict[str, Any]]:
+    """How a car is driven, line by line: steady map and mean-value engine, alone and with its machine.
+
+    A machine fills the hole of an engine that it turns with; none does of one that has a speed of its own.
+    """
     found: list[dict[str, Any]] = [{"engine_model": "map"}]
     if boost:
         found.append({"engine_model": "map", "boosts": True})
     if engine_model == "mean_value":
         found.append({"engine_model": "mean_value"})
         if boost:
-            found.append({"engine_model": "mean_value", "fills": True})
+            if not car.driveline.free_engine_speed:
+                found.append({"engine_model": "mean_value", "fills": True})
             found.append({"engine_model": "mean_value", "boosts": True})
     return found
 

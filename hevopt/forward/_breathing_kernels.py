@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 
 from hevopt._compile import compiled
 from hevopt.forward import _drive_kernels as drive
+from hevopt.forward import _free_loop_kernels as free
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward import _pull_kernels as pulling
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._contact_kernels import pace_of
+from hevopt.forward._free_kernels import FreeCar, FreeCourse
 from hevopt.forward._limits_kernels import Gives, Limits, by_map
 from hevopt.mean_value import states as s
 from hevopt.mean_value._gas_kernels import curve, state_of
@@ -101,6 +103,26 @@ def advance_breathing(
         loop, wanted = drive.after_step(car, task, work, loop, place, gives, pace, record[i])
         burns = loop.joint.phase == motor.TURNING
         given = record[i, drive.ENGINE] if burns else -np.inf
+        breath[i, AVAILABLE] = gives.most_nm
+        breathed(gas, given, max(wanted, given), loop.state.side_radps, step_s, air, breath[i])
+    return loop
+
+
+@compiled(nogil=True)
+def advance_free_breathing(
+    car: FreeCar, task: LoopTask, course: FreeCourse, work: drive.Work, loop: free.FreeLoop, first: int,
+    record: Array, step_s: float, air: Air, gas: Array, breath: Array,
+) -> free.FreeLoop:  # fmt: skip
+    """`advance_breathing` where the engine has a speed of its own; the pedal is that of the torque planned."""
+    pace, start = pace_of(step_s, car.loop.body.tyre.lag_s), task.time_s[0]
+    place = drive.Place(start, 0, 0)
+    for i in range(len(record)):
+        place = drive.place_of(task, place, start + (first + i) * step_s)
+        if not drive.is_answered(car.loop, task, loop, place.d, step_s):
+            break
+        gives = gives_now(gas, loop.state.side_radps, car.loop.limits, air.model)
+        loop, wanted = free.after_step(car, task, course, work, loop, place, gives, pace, record[i])
+        given = record[i, drive.ENGINE] if loop.phase == motor.TURNING else -np.inf
         breath[i, AVAILABLE] = gives.most_nm
         breathed(gas, given, max(wanted, given), loop.state.side_radps, step_s, air, breath[i])
     return loop

@@ -21,7 +21,7 @@ from hevopt.forward._drive_kernels import (
     place_of,
     record_step,
 )
-from hevopt.forward._free_battery_kernels import held_back
+from hevopt.forward._free_battery_kernels import held_back, started
 from hevopt.forward._free_kernels import (
     Allotted,
     FreeCar,
@@ -33,7 +33,7 @@ from hevopt.forward._free_kernels import (
     may_not_rest,
     side_after,
 )
-from hevopt.forward._limits_kernels import HALVINGS, by_map, limit_nm, terminal_w
+from hevopt.forward._limits_kernels import Gives, by_map, limit_nm
 from hevopt.forward._pedal_kernels import PedalState, pressed, remembered, wanted_at
 from hevopt.forward._plant_kernels import step
 from hevopt.forward._rows_kernels import Array, Inputs, Outputs, State
@@ -107,43 +107,19 @@ def _clutch_closing(
 
 
 @compiled(bare=True)
-def _started(
-    car: FreeCar, row: Array, side: float, accel: float, side_accel: float, load_w: float, step_s: float
-) -> tuple[float, float]:  # fmt: skip
-    """Acceleration of an engine that is started, as far as the battery has power for it, and the load with that.
-
-    side, accel, side_accel: speed of the engine's side, rad/s, and accelerations of wheels and side that are asked
-    """
-    limits = car.loop.limits
-    low, high, share, load = 0.0, 1.0, 1.0, load_w
-    for _ in range(HALVINGS):
-        reached = share * side_accel
-        spun_nm = (row[col.SIDE_PER_N] * reached + row[col.SIDE_PER_W] * accel) / row[
-            col.SIDE_ENGINE
-        ]
-        spun_w = max(spun_nm * (side + 0.5 * step_s * reached), 0.0) / limits.spin_efficiency
-        if terminal_w(load_w + spun_w, limits) <= car.motors.most_w:
-            low, load = share, load_w + spun_w
-            if share == 1.0:
-                break
-        else:
-            high = share
-        share = 0.5 * (low + high)
-    return low * side_accel, load
-
-
-@compiled(bare=True)
 def _wish(
     car: FreeCar, task: LoopTask, course: FreeCourse, row: Array, now: Now, loop: FreeLoop, pedal: PedalState,
-    phase: int, closing: float, step_s: float,
+    phase: int, closing: float, planned: float, gives: Gives, step_s: float,
 ) -> FreeWish:  # fmt: skip
-    """What driver and plan ask for; limits are those at both ends of the step; a starter's work counts as load."""
+    """What driver and plan ask for; limits are those at both ends of the step; a starter's work counts as load.
+
+    planned: torque of the engine; gives: what this can at the step's beginning, at its end by the map's slope
+    """
     body, limits, state = car.loop.body, car.loop.limits, loop.state
     wheel = state.speed_mps / body.radius_m
     turns, braking = phase == motor.TURNING, pedal.force_n < 0.0 and not pedal.holds
     accel = 0.0 if pedal.holds else pedal.accel_mps2 / body.radius_m
     ahead = max(wheel + step_s * accel, 0.0)
-    gives, planned = by_map(now.side_radps, limits), _planned_nm(car, task, course, now)
     # What full load cannot give of the charge that lacks a higher speed gives.
     beyond = max(planned - max(gives.most_nm, course.engine_nm[now.step]), 0.0)
     more = min(1.0 + beyond / max(gives.most_nm, 1.0), _FASTER)
@@ -151,9 +127,11 @@ def _wish(
     side_accel /= step_s
     load_w = task.load_w[0 if phase == motor.REST else 1, now.k]
     if phase == motor.STARTING:
-        side_accel, load_w = _started(car, row, now.side_radps, accel, side_accel, load_w, step_s)
+        side_accel, load_w = started(car, row, now.side_radps, accel, side_accel, load_w, step_s)
+    before = by_map(now.side_radps, limits)
     after = by_map(now.side_radps + step_s * side_accel, limits)
-    least, most = min(gives.least_nm, after.least_nm), min(gives.most_nm, after.most_nm)
+    least = gives.least_nm + min(after.least_nm - before.least_nm, 0.0)
+    most = gives.most_nm + min(after.most_nm - before.most_nm, 0.0)
     engine = least
     if planned > 0.5 * least or least == 0.0:
         least, most = car.fuelled_nm, max(most, car.fuelled_nm)
@@ -168,7 +146,7 @@ def _wish(
     if now.energy_j >= car.loop.window_j[1] or (braking and not limits.regenerates):
         least_w = 0.0
     if not turns:
-        engine = by_map(now.side_radps, limits).least_nm if side_accel < 0.0 else 0.0
+        engine = gives.least_nm if side_accel < 0.0 else 0.0
     return FreeWish(wheel_nm, accel, side_accel, engine, least, most, turns, closing > 0.0,
                 pedal.holds, braking, least_w, most_w, load_w)  # fmt: skip
 
@@ -239,10 +217,10 @@ def _stepped(
 
 @compiled(bare=True)
 def after_step(
-    car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, loop: FreeLoop, place: Place, pace: Pace,
-    row: Array,
-) -> FreeLoop:  # fmt: skip
-    """The loop after one step; row: filled."""
+    car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, loop: FreeLoop, place: Place, gives: Gives,
+    pace: Pace, row: Array,
+) -> tuple[FreeLoop, float]:  # fmt: skip
+    """The loop after one step, and the torque wanted of the engine; gives: what this can give; row: filled."""
     body, limits, driver, step_s = car.loop.body, car.loop.limits, car.loop.driver, pace.step_s
     machine_nm, speeds = work.machine_nm, work.machine_radps
     state, pedal, phase, closing, energy, wanted = loop
@@ -257,8 +235,9 @@ def after_step(
     phase = motor.phase_after(phase, on, state.side_radps, limits.idle_radps)
     turns = phase == motor.TURNING
     closing = _clutch_closing(car, loop, course.closed[d], turns, step_s)
+    planned = _planned_nm(car, task, course, now)
     wish = _wish(car, task, course, work.rows[state.way, state.variant], now, loop, pedal, phase,
-                 closing, step_s)  # fmt: skip
+                 closing, planned, gives, step_s)  # fmt: skip
     for m in range(len(machine_nm)):
         machine_nm[m] = course.machine_nm[d, m] if turns else 0.0
     _speeds(car, state.way, wheel, state.side_radps, speeds)
@@ -280,7 +259,7 @@ def after_step(
     pedal = remembered(pedal, full and pedal.error_mps > 0.0, body, driver, step_s)
     cause = motor.CHANGE if closing > 0.0 else motor.NONE
     record_step(row, state, pedal, energy, phase, cause, full, out, machine_nm)
-    return FreeLoop(state, pedal, phase, closing, energy, ahead)
+    return FreeLoop(state, pedal, phase, closing, energy, ahead), planned
 
 
 @compiled(bare=True, nogil=True)
@@ -288,12 +267,16 @@ def advance(
     car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, loop: FreeLoop, first: int, record: Array,
     step_s: float,
 ) -> FreeLoop:  # fmt: skip
-    """The loop after some more steps, `first` of them being the first; record: (step, column), filled."""
+    """The loop after some more steps, `first` of them being the first; record: (step, column), filled.
+
+    The engine is that of the steady map.
+    """
     pace, start = pace_of(step_s, car.loop.body.tyre.lag_s), task.time_s[0]
     place = Place(start, 0, 0)
     for i in range(len(record)):
         place = place_of(task, place, start + (first + i) * step_s)
         if not is_answered(car.loop, task, loop, place.d, step_s):
             break
-        loop = after_step(car, task, course, work, loop, place, pace, record[i])
+        gives = by_map(loop.state.side_radps, car.loop.limits)
+        loop, _ = after_step(car, task, course, work, loop, place, gives, pace, record[i])
     return loop

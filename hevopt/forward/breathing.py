@@ -11,10 +11,12 @@ from hevopt.errors import DataError, SolverError
 from hevopt.forward import _breathing_kernels as col
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._drive_kernels import Loop, Work
+from hevopt.forward._free_kernels import FreeCar, FreeCourse
+from hevopt.forward._free_loop_kernels import FreeLoop
 from hevopt.forward._pull_kernels import Foot, Pull, PullWork
 from hevopt.mean_value._run_kernels import TABLEAUX
 from hevopt.mean_value.car import BENCH, model_of
-from hevopt.mean_value.parameters import FULL_LOAD, Drive, curve_of
+from hevopt.mean_value.parameters import FULL_LOAD, Diesel, Drive, curve_of
 from hevopt.mean_value.run import STEP_S
 from hevopt.mean_value.settle import steady_state
 from hevopt.mean_value.stability import longest_step_s
@@ -34,9 +36,7 @@ class Breathing:
     """
 
     def __init__(self, car: Architecture, side_radps: float, torque_nm: float = 0.0) -> None:
-        if car.electric:
-            raise DataError(f"{car.name}: it has no engine; leave --engine-model mean_value out")
-        diesel = mean_value_of(f"{car.source}, engine", car.contents["engine"])
+        diesel = diesel_of(car)
         self._model = model_of(diesel, BENCH, Drive(held=1.0))
         full = float(np.interp(side_radps, *curve_of(diesel.curves, FULL_LOAD)))
         given = self._model._replace(drive=Drive(held=1.0, torque_nm=torque_nm))
@@ -52,6 +52,17 @@ class Breathing:
         for done, part, air, breath in self._pieces(record, step_s):
             loop = col.advance_breathing(
                 car, task, work, loop, first + done, part, step_s, air, self._gas, breath
+            )
+        return loop
+
+    def advance_free(
+        self, car: FreeCar, task: LoopTask, course: FreeCourse, work: Work, loop: FreeLoop, first: int,
+        record: Array, step_s: float,
+    ) -> FreeLoop:  # fmt: skip
+        """The loop after some more steps, as `_free_loop_kernels.advance` with the steady map."""
+        for done, part, air, breath in self._pieces(record, step_s):
+            loop = col.advance_free_breathing(
+                car, task, course, work, loop, first + done, part, step_s, air, self._gas, breath
             )
         return loop
 
@@ -97,25 +108,24 @@ class Breathing:
         return np.concatenate(self._found)
 
 
-def check_engine_model(engine_model: str) -> None:
-    """DataError for a model of the engine that is none."""
+def diesel_of(car: Architecture) -> Diesel:
+    """A car's mean-value engine; DataError for a car without one."""
+    if car.electric:
+        raise DataError(f"{car.name}: it has no engine; leave --engine-model mean_value out")
+    return mean_value_of(f"{car.source}, engine", car.contents["engine"])
+
+
+def check_engine_model(car: Architecture, engine_model: str) -> None:
+    """DataError for a model of the engine that is none, or that this car has no data for."""
     if engine_model not in ENGINE_MODELS:
         raise DataError(f"engine model {engine_model!r}; allowed: {', '.join(ENGINE_MODELS)}")
-
-
-def check_steady(car: Architecture, engine_model: str) -> None:
-    """DataError for a model of the engine that is none, or that this car is not driven with."""
-    check_engine_model(engine_model)
-    if engine_model == "mean_value" and car.driveline.free_engine_speed:
-        raise DataError(
-            f"{car.name}: an engine that has a speed of its own is driven by its map only; leave --engine-model "
-            "mean_value out"
-        )
+    if engine_model == "mean_value":
+        diesel_of(car)
 
 
 def breathing_of(
     car: Architecture, engine_model: str, side_radps: float, torque_nm: float = 0.0
 ) -> Breathing | None:
     """The gas of an engine that turns at a speed with a torque; None for the steady map."""
-    check_engine_model(engine_model)
+    check_engine_model(car, engine_model)
     return Breathing(car, side_radps, torque_nm) if engine_model == "mean_value" else None

@@ -19,6 +19,7 @@ from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._free_kernels import FreeCar, FreeCourse
 from hevopt.forward._limits_kernels import Motors
 from hevopt.forward._pedal_kernels import PedalState
+from hevopt.forward.breathing import EngineModel, breathing_of
 from hevopt.forward.forces import Curves, resistance_n, tabulated
 from hevopt.forward.lines import Line
 from hevopt.forward.loads import own_loads_w
@@ -53,9 +54,20 @@ class Fullest(NamedTuple):
 
 
 class FreePull:
-    """A car at full pedal; with the battery's help or without, when what the generator gives is all there is."""
+    """A car at full pedal; with the battery's help or without, when what the generator gives is all there is.
 
-    def __init__(self, car: Architecture, line: Line, driven: LoopCar, helped: bool) -> None:
+    engine_model: with the mean-value engine it is taken where the force is highest by the steady map
+    """
+
+    def __init__(
+        self,
+        car: Architecture,
+        line: Line,
+        driven: LoopCar,
+        helped: bool,
+        engine_model: EngineModel,
+    ) -> None:
+        self._named, self._engine_model = car, engine_model
         still = DriverGains(*[0.0] * len(DriverGains._fields))._replace(
             governor_s=driven.driver.governor_s, start_s=driven.driver.start_s
         )
@@ -89,6 +101,8 @@ class FreePull:
         course = FreeCourse(np.array([self._slowest(wheel)]), np.zeros(1),
                             np.zeros((1, len(self._work.machine_nm))), np.zeros(1, dtype=bool))  # fmt: skip
         loop = free.begun(self._car, task, course, start_j)
+        breathing = breathing_of(self._named, self._engine_model, loop.state.side_radps)
+        advance = free.advance if breathing is None else breathing.advance_free
         task = _task(self._loads_w, 1.0)
         rows = np.zeros((steps, drive.COLUMNS + len(self._work.machine_nm) - 1))
         done = 0
@@ -99,7 +113,7 @@ class FreePull:
             if best is None or left_j <= _SPARE * step_s * _PIECE * car.motors.most_w:
                 best, car = self.alone, car._replace(motors=car.motors._replace(most_w=0.0))
             loop = self._ordered(loop, course, best)
-            loop = free.advance(car, task, course, self._work, loop, first, part, step_s)
+            loop = advance(car, task, course, self._work, loop, first, part, step_s)
             done = first + len(part)
             moved_m = step_s * float(np.sum(rows[:done, drive.SPEED]))
             if loop.state.speed_mps >= until[0] and moved_m >= until[1]:
@@ -128,11 +142,11 @@ class FreePull:
 
 
 def check_steady_pull(car: Architecture, fills: bool, boost_lag_s: float) -> None:
-    """DataError for a lag of the boost, or its filling, of an engine that has a speed of its own."""
+    """DataError for a lag of the map's boost, or its filling, of an engine that has a speed of its own."""
     if car.driveline.free_engine_speed and (fills or boost_lag_s > 0):
         raise DataError(
-            f"{car.name}: boost of an engine that has a speed of its own has no lag here, and no hole to fill; "
-            "leave --boost-lag out"
+            f"{car.name}: the steady map of an engine that has a speed of its own has no lag, and no machine that "
+            "only fills it; leave --boost-lag out, or drive it with --engine-model mean_value"
         )
 
 

@@ -9,7 +9,7 @@ from hevopt.forward import _drive_kernels as geared
 from hevopt.forward import _free_loop_kernels as free
 from hevopt.forward._acting_kernels import LoopCar, LoopTask
 from hevopt.forward._free_kernels import FreeCar, FreeCourse, begins_radps
-from hevopt.forward.breathing import Breathing, EngineModel, breathing_of, check_steady
+from hevopt.forward.breathing import EngineModel, breathing_of
 from hevopt.forward.limits import motors_of
 from hevopt.forward.lines import Line
 from hevopt.problem.arrays import Array
@@ -33,18 +33,13 @@ class Driving:
         course: FreeCourse | None,
         engine_model: EngineModel = "map",
     ) -> None:
-        check_steady(car, engine_model)
         self._driven, self._task, self.course = driven, task, course
         self._work = geared.work_of(driven.ways)
         idle = car.engine.idle_radps
         turns = line.ways.wheel[task.way[0], -1] * start_mps
         self._start = float(max(idle, turns / car.vehicle.tyre_radius_m))
-        self.breathing: Breathing | None = None
-        self._free: FreeCar | None = None
-        if line.free is None:
-            self.breathing = breathing_of(car, engine_model, self._start)
-        else:
-            self._free = free_car(car, line, driven)
+        self._free = None if line.free is None else free_car(car, line, driven)
+        self.breathing = breathing_of(car, engine_model, self.start_radps)
 
     @property
     def start_radps(self) -> float:
@@ -66,7 +61,8 @@ class Driving:
     def advance(self, loop: Any, first: int, record: Array, step_s: float) -> Any:
         """The loop after some more steps, `first` of them being the first; record: filled."""
         if self._free is not None and self.course is not None:
-            return free.advance(
+            march = free.advance if self.breathing is None else self.breathing.advance_free
+            return march(
                 self._free, self._task, self.course, self._work, loop, first, record, step_s
             )
         advance = geared.advance if self.breathing is None else self.breathing.advance

@@ -14,7 +14,7 @@ from hevopt.forward import _pull_kernels as col
 from hevopt.forward._acting_kernels import LoopCar
 from hevopt.forward._contact_kernels import resistance
 from hevopt.forward._pull_kernels import Foot
-from hevopt.forward.breathing import Breathing, EngineModel, check_steady
+from hevopt.forward.breathing import Breathing, EngineModel, check_engine_model
 from hevopt.forward.forces import (
     LAUNCH_RPM,
     Curves,
@@ -131,7 +131,7 @@ def performance(
     shifting = (handling.shifting or shifting_of(car))._replace(between_s=0.0, reversal_s=0.0)
     driven = loop_car(loaded, line, handling._replace(shifting=shifting))
     start_j = float(energy_j(car.battery, car.soc_start))
-    free = FreePull(loaded, line, driven, boosts) if line.free else None
+    free = FreePull(loaded, line, driven, boosts, engine_model) if line.free else None
     curves, engine = (
         free.curves(helps) if free else forces_of(loaded, line, driven, helps)
         for helps in (boosts or car.electric, car.electric)
@@ -181,7 +181,7 @@ def _check(
         raise DataError(
             f"added mass {added_kg:g} kg, boost lag {boost_lag_s:g} s; allowed: -200 to 5000 kg, 0 to 10 s"
         )
-    check_steady(car, engine_model)
+    check_engine_model(car, engine_model)
     if engine_model == "mean_value" and boost_lag_s > 0:
         raise DataError(
             f"boost lag {boost_lag_s:g} s beside engine model mean_value, whose turbocharger has a lag of its own; "

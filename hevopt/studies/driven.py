@@ -13,7 +13,7 @@ from hevopt.driving.cycle import Cycle
 from hevopt.errors import DataError
 from hevopt.forward import _motor_kernels as motor
 from hevopt.forward.asked import Asking, follow_asked
-from hevopt.forward.breathing import EngineModel, check_steady
+from hevopt.forward.breathing import EngineModel, check_engine_model
 from hevopt.forward.lines import line_of
 from hevopt.forward.plans import replay_of, signals_of
 from hevopt.forward.run import STEP_S, ForwardRun, check_step, follow, whole_handling
@@ -130,7 +130,7 @@ def drive(
     check_horizon(settings.horizon_s, [strategy])
     strategy_named(strategy)
     asking.check()
-    check_steady(car, engine_model)
+    check_engine_model(car, engine_model)
     check_step(step_s, whole_handling(car, handling))
     line_of(car)
     planned = planned_for(car, cycle, settings)
