@@ -13,21 +13,42 @@ import os
 import pickle
 import shutil
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from fnmatch import fnmatch
 from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
-import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
-from numba.core.codegen import JITCodeLibrary, ll
-from numba.core.compiler import CompileResult
-from numba.core.dispatcher import Dispatcher
-from numba.core.environment import Environment, _rebuild_env
-from numba.core.runtime import rtsys
+import numpy as np
+
+
+@contextmanager
+def _without(*modules: str) -> Iterator[None]:
+    """Imports within find none of some modules, which they could do without, unless these are loaded already."""
+    hidden = [name for name in modules if name not in sys.modules]
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
+    try:
+        yield
+    finally:
+        for name in hidden:
+            del sys.modules[name]
+
+
+# What numba would take along where it is installed; yaml reads settings from one file.
+with _without("coverage", "scipy", *([] if os.path.exists(".numba_config.yaml") else ["yaml"])):
+    import numba
+    from numba.core import types
+    from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
+    from numba.core.codegen import JITCodeLibrary, ll
+    from numba.core.compiler import CompileResult
+    from numba.core.dispatcher import Dispatcher
+    from numba.core.environment import Environment, _rebuild_env
+    from numba.core.errors import NumbaNotImplementedError
+    from numba.core.runtime import rtsys
+    from numba.core.typing.typeof import typeof_impl
+    from numba.np import numpy_support
 
 _DIGEST_BYTES = hashlib.sha256().digest_size
 # Files of loops, and of the tuples and constants that they are compiled with.
@@ -36,6 +57,21 @@ _COMPILED_WITH = (
     "units.py",
 )  # fmt: skip
 _Loop = TypeVar("_Loop", bound=Callable[..., Any])
+_type_of_any_array = typeof_impl.dispatch(np.ndarray)
+
+
+def _type_of_array(array: Any, context: Any) -> Any:
+    """What numba says an array is, which asks whether it is a masked one, and loads numpy's masked arrays for that;
+    where nobody has loaded them there is none.
+    """
+    if "numpy.ma" not in sys.modules:
+        with suppress(NumbaNotImplementedError):
+            kind, layout = numpy_support.from_dtype(array.dtype), numpy_support.map_layout(array)
+            return types.Array(kind, array.ndim, layout, readonly=not array.flags.writeable)
+    return _type_of_any_array(array, context)
+
+
+typeof_impl.register(np.ndarray)(_type_of_array)
 
 
 def compiled(

@@ -198,3 +198,26 @@ def test_a_loop_that_counts_no_references_gives_back_no_array():
             if one is function or not inlined(one):
                 assert not has_arrays(get_type_hints(one)["return"]), (name, one.__name__)
     assert has_arrays(Inputs) and not has_arrays(State)
+
+
+BROUGHT = """
+import sys
+import numpy as np
+from hevopt._compile import compiled
+
+@compiled()
+def first(x):
+    return x[0]
+
+found = first(np.arange(3.0)), first(np.ones((2, 2), dtype=bool)[:, :1])
+print(*{"coverage", "scipy", "yaml", "numpy.ma"} & sys.modules.keys())
+"""
+
+
+def test_kept_loops_take_along_nothing_that_they_never_use(tmp_path):
+    (tmp_path / "brought.py").write_text(BROUGHT)
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "brought.py"], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+    assert done.stdout.split() == []

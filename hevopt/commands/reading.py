@@ -35,7 +35,7 @@ def read_ahead(
     from hevopt.studies.halves import ahead
 
     def read() -> Read:
-        from hevopt.reproduction.published import is_study
+        from hevopt.reproduction.published import CYCLE, is_study
         from hevopt.studies.given import given_of, joined, study_of
         from hevopt.studies.study_file import read_study
 
@@ -43,6 +43,9 @@ def read_ahead(
         asked = study_of(joined(below, given_of(place, options)))
         cars = cars_of(asked.architectures, asked.settings)
         trace = load_cycle(asked.cycle)
-        return Read(asked.settings, cars, trace, is_study(cars.cars, trace))
+        shipped = asked.architectures is None and asked.cycle == CYCLE
+        as_shipped = shipped and not asked.settings.free_gear and not any(cars.changes.values())
+        # Else all of the study would have to be read once more.
+        return Read(asked.settings, cars, trace, as_shipped or is_study(cars.cars, trace))
 
     return ahead(read)

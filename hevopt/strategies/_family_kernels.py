@@ -8,8 +8,12 @@ from hevopt._compile import compiled
 from hevopt.problem._battery_kernels import BatteryArrays
 from hevopt.problem.arrays import Array, Flags, Indices
 from hevopt.problem.choices import Choices
-from hevopt.strategies._neutral_kernels import abreast_at_rest, enough, lane_of, neutral_drive
+from hevopt.strategies._abreast_kernels import drive_lanes, empty_lanes, fill, narrowed, take_up
+from hevopt.strategies._neutral_kernels import neutral_drive
 from hevopt.strategies._rule_kernels import Rule, RuleDrive, Span
+
+# Drives side by side: with more of them the processor has no more to do at once.
+_LANES = 8
 
 
 class FamilySteps(NamedTuple):
@@ -104,11 +108,19 @@ def screened(
     battery: BatteryArrays,
 ) -> Array:
     """(member, 4) as `judged`, of drives that keep the lowest charging power that is enough to their end."""
-    found, hint = np.empty((len(limits), 4)), len(engine) // 2
-    drives = abreast_at_rest(3, len(choices.step_s), span.start)
-    for n in range(len(limits)):
-        rule = rule_of(steps, limits[n])
-        hint, lane, below = enough(rule, engine, hint, choices, span, battery, drives)
-        driven = lane_of(drives, lane if lane >= 0 else below)
-        found[n] = result_of(driven, steps.nox_kg, choices, span)
+    found, levels = np.empty((len(limits), 4)), len(engine)
+    lanes, search = empty_lanes(min(_LANES, len(limits)), len(choices.step_s))
+    active, begun, slope_j, level = 0, 0, 0.0, levels // 2
+    while active > 0 or begun < len(limits):
+        while active < len(lanes.least_j) and begun < len(limits):
+            rule = rule_of(steps, limits[begun])
+            take_up(active, begun, rule, level, levels, lanes, search)
+            active, begun = active + 1, begun + 1
+        fill(active, engine, lanes, search)
+        drive_lanes(
+            active, steps.modes, steps.nox_kg, steps.price_kgpj, choices, span, battery, lanes
+        )
+        # What is tried last lies close to what the next member needs.
+        level = search.level[0]
+        active, slope_j = narrowed(active, levels, slope_j, lanes, search, found)
     return found

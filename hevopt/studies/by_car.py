@@ -1,14 +1,17 @@
 """The strategies of some cars on a cycle, solved car by car."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 from hevopt.car.architecture import Architecture
 from hevopt.driving.cycle import Cycle
 from hevopt.errors import HevoptError, InfeasibleError, SolverError, UnknownNoxError
-from hevopt.problem.problem import Plan, Trajectory
-from hevopt.strategies import Strategy
+from hevopt.powertrain._torque_kernels import resolved
+from hevopt.problem.problem import Plan, Problem, Trajectory
+from hevopt.strategies import Strategy, strategy_named
 from hevopt.studies.case import Case, prepare
 from hevopt.studies.halves import SharedCount, halves, nothing, two_processors
 from hevopt.studies.rows import Row, failed_row
@@ -61,7 +64,7 @@ class OfCar(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Solving:
-    """Strategies by car, on a cycle."""
+    """Strategies by car, on a cycle; compiled: those whose loops were compiled before their turn."""
 
     asked: Sequence[tuple[Architecture, Sequence[str]]]
     cycle: Cycle
@@ -69,6 +72,7 @@ class Solving:
     others: Mapping[str, Strategy]
     watch: Watch
     tally: SharedCount = field(default_factory=SharedCount)
+    compiled: list[str] = field(default_factory=list)
 
     def found(self, may_fork: bool) -> list[OfCar]:
         """Every car's; may_fork: by two processes where memory lasts for two, nobody observes, and no strategy from
@@ -91,7 +95,7 @@ class Solving:
         found = OfCar([], {}, {}, {})
         self._told(f"{car.name}: table and certificate")
         try:
-            case = prepare(car, self.cycle, self.settings)
+            case = prepare(car, self.cycle, self.settings, begun=partial(self._compile, wanted))
         except _FAILURES as error:
             self.tally.add(len(wanted))
             rows = [failed_row(car, name, error) for name in wanted]
@@ -101,6 +105,19 @@ class Solving:
             found.rows.append(self._row(case, name, found))
             self.tally.add(1)
         return found._replace(lost=lost_proofs(case))
+
+    def _compile(self, wanted: Sequence[str], problem: Problem) -> None:
+        """Where the process that was forked meets loops that nobody has compiled yet: those of strategies, as the
+        first begins with dynamic programming and certificate. Each then finds on the disk what the other compiled.
+        """
+        loaded = getattr(resolved, "stats", None)
+        if self.tally.of_first or loaded is None or not loaded.cache_misses or self.compiled:
+            return
+        self.compiled.extend(wanted)
+        for strategy in (strategy_named(name) for name in wanted if name != "dp"):
+            with suppress(HevoptError):
+                if strategy.usual:
+                    strategy.solve(problem)
 
     def _told(self, what: str) -> None:
         if not self.tally.of_first:

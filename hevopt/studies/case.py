@@ -1,5 +1,6 @@
 """A case: one car on one cycle, solved by dynamic programming and certified."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -51,14 +52,24 @@ class Case(Shown):
 _DEFAULTS = Settings()
 
 
+def unused(problem: Problem) -> None:
+    """Nobody does anything with a problem before it is solved."""
+
+
 def prepare(
-    car: Architecture, cycle: Cycle, settings: Settings = _DEFAULTS, *, levels: int = TORQUE_LEVELS
+    car: Architecture,
+    cycle: Cycle,
+    settings: Settings = _DEFAULTS,
+    *,
+    levels: int = TORQUE_LEVELS,
+    begun: Callable[[Problem], None] = unused,
 ) -> Case:
     """The problem of a car on a cycle, solved by dynamic programming and certified.
 
     Of the settings it takes nox_weight, allow_shortfall and refine: then torque levels are added around the plan,
     closer each time, until its cost moves by less than 0.02 %; plans and certificate are those of the table with
-    the added levels. Raises UnknownNoxError for a weight on NOx where the engine has no data on it.
+    the added levels. begun: called with the first problem before it is solved. Raises UnknownNoxError for a weight
+    on NOx where the engine has no data on it.
     """
     nox_weight = settings.nox_weight
 
@@ -71,6 +82,8 @@ def prepare(
             allow_shortfall=settings.allow_shortfall,
             around=around,
         )
+        if around is None:
+            begun(problem)
         enough = _ENOUGH if around is None else _ENOUGH_REFINED
         return dp_case(car, cycle, problem, enough_gap=enough)
 

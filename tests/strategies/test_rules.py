@@ -1,5 +1,6 @@
 """The rules: thresholds calibrated together or given by the file, load shifted up and down."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -17,6 +18,7 @@ from hevopt.strategies._rules import (
     eligible,
     engine_entries,
     figures_of,
+    rule_for,
     rules_of,
 )
 
@@ -215,3 +217,26 @@ def test_members_that_drive_electrically_at_the_same_steps_are_driven_once(probl
     assert np.array_equal(judged.figures(limits), every)
     assert np.array_equal(judged.figures(limits[3:5]), every[3:5])
     assert len(np.unique(every, axis=0)) <= len(driven) < len(limits)
+
+
+@pytest.mark.parametrize("missing_j", [0.0, 1e9], ids=["reached", "out of reach"])
+def test_screened_members_keep_the_lowest_level_that_leaves_enough(problem, missing_j):
+    rules = rules_of(problem)
+    rules = replace(rules, span=rules.span._replace(end_j=rules.span.end_j + missing_j))
+    engine, choices, battery = engine_entries(rules), rules.choices, problem.battery.arrays
+    limits = [
+        ElectricLimits(soc, power, speed)
+        for soc, power, speed in product((0.42, 0.5), (0.0, 3000.0, 9000.0), (9.0, 30.0))
+    ]
+    driven = kernels.at_rest(choices.steps, rules.span.start)
+    for own, figures in zip(limits, figures_of(rules, limits, engine, quick=True), strict=True):
+        rule, every = rule_for(rules, own), []
+        for level in engine:
+            kernels.drive_on(rule, level, 0, choices, battery, driven)
+            every.append(family.result_of(driven, rules.steps.nox_kg, choices, rules.span))
+        level, beyond_j = every.index(tuple(figures)), [result[2] for result in every]
+        if missing_j:
+            assert every[level] == every[-1]
+        else:
+            assert beyond_j[level] >= 0
+            assert beyond_j[level - 1] < 0

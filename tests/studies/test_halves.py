@@ -8,6 +8,8 @@ import sys
 import threading
 import time
 from dataclasses import asdict
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from hevopt.driving.cycle import load_cycle
 from hevopt.errors import DataError, InfeasibleError
 from hevopt.problem.problem import Problem
 from hevopt.strategies import chosen
-from hevopt.studies.by_car import Watch
+from hevopt.studies.by_car import NOBODY, Solving, Watch
 from hevopt.studies.cars import cars_of
 from hevopt.studies.comparison import compare_cars, solve
 from hevopt.studies.halves import SharedCount, ahead, halves, two_processors
@@ -215,6 +217,26 @@ def test_comparison_by_two_processes_is_that_of_one(monkeypatch: pytest.MonkeyPa
     assert forked.reference == alone.reference
     assert forked.failures.keys() == alone.failures.keys()
     assert all(0 <= done < total for done, total in told)
+
+
+@pytest.mark.parametrize(("of_first", "missed"), [(True, 1), (False, 0), (False, 1)])
+def test_a_forked_process_that_has_to_compile_begins_with_the_loops_of_strategies(
+    of_first: bool, missed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solved: list[str] = []
+
+    def noted(name: str) -> SimpleNamespace:
+        return SimpleNamespace(usual=name != "mpc", solve=lambda problem: solved.append(name))
+
+    loop = SimpleNamespace(stats=SimpleNamespace(cache_misses={"types": 1} if missed else {}))
+    monkeypatch.setattr("hevopt.studies.by_car.resolved", loop)
+    monkeypatch.setattr("hevopt.studies.by_car.strategy_named", noted)
+    case: Any = None
+    solving = Solving([], load_cycle("nedc"), Settings(), {}, NOBODY)
+    solving.tally.of_first = of_first
+    for _ in range(2):
+        solving._compile(("ecms", "dp", "mpc", "conventional"), case)
+    assert solved == (["ecms", "conventional"] if missed and not of_first else [])
 
 
 def test_strategies_from_outside_are_asked_by_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
