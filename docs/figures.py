@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from hevopt import build_problem, compare, load_architecture, load_cycle, simulate, solve
 from hevopt.bounds._prices_kernels import shortest_path
-from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.bounded import drain_at_j
+from hevopt.bounds.lower_dp import lower_bound_kg
 from hevopt.bounds.prices import one_price_dual
 from hevopt.bounds.step_prices import costate_dual, lp_prices_kgpj
 from hevopt.problem.choices import choices_of

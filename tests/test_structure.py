@@ -240,6 +240,12 @@ def test_neither_importing_hevopt_nor_help_loads_what_is_slow_to_load(words):
     assert subprocess.run(command, capture_output=True, text=True).stderr.strip() == ""
 
 
+_PLANNED = """
+from hevopt.sweeps.plan.jobs import jobs_of
+print(*jobs_of("C2", ["nedc"], ["dp"], [({}, [(0, 2.0)])]))
+"""
+
+
 @pytest.mark.parametrize(
     "work, spared",
     [
@@ -247,14 +253,16 @@ def test_neither_importing_hevopt_nor_help_loads_what_is_slow_to_load(words):
         ("hevopt.compare", "hevopt.car_files.load"),
         ("hevopt.compare", "pydantic"),
         ("hevopt.STRATEGIES, hevopt.sweep", "numba"),
+        (_PLANNED, "numba"),
     ],
     ids=[
         "reading cars without loops",
         "computing without models of files",
         "computing without checks of settings",
-        "planning a sweep",
+        "asking for a sweep",
+        "planning one with weights on NOx",
     ],
 )
 def test_reading_and_computing_can_be_loaded_at_once_by_two_processes(work, spared):
-    code = f"import sys, hevopt; {work}; sys.exit({spared!r} in sys.modules)"
+    code = f"import sys, hevopt\n{work}\nsys.exit({spared!r} in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

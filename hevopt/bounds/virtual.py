@@ -115,7 +115,7 @@ def _virtual_of(problem: Problem) -> Virtual | None:
     known = _cost_kg(
         problem, table.fuel_kg, table.nox_kg, table.battery_power_w, table.step_s[:, None]
     )
-    if known is not problem.cost_kg and not np.allclose(
+    if not np.array_equal(known, problem.cost_kg) and not np.allclose(
         known, problem.cost_kg, rtol=1e-12, atol=0.0
     ):
         return None  # an objective of which the lines know nothing

@@ -52,7 +52,7 @@ def load_architecture(name: str | Path, changes: Mapping[str, Any] | None = None
     """
     path = find("architectures", name, ".toml")
     own, of_parts = sorted_changes(changes or {})
-    contents = with_changes(read_contents(path), own)
+    contents = _changed(read_contents(path), own)
     data = checked(_place(str(path), own), contents, ArchitectureFile)
     contents, files = dict(contents), [path]
     files_of, places = dict[str, FileModel](), dict[str, str]()
@@ -209,7 +209,14 @@ def component_contents(
         table = merged(table, own)
         place = f"{_place(place, [f'{key}.{name}' for name in own])} in {path}"
     place = _place(place, [f"{key}.{name}" for name in changes])
-    return ComponentContents(found, with_changes(table, changes, within=f"{key}."), place)
+    return ComponentContents(found, _changed(table, changes, within=f"{key}."), place)
+
+
+def _changed(
+    contents: dict[str, Any], changes: Mapping[str, Any], within: str = ""
+) -> dict[str, Any]:
+    """Contents that have just been read, with changes; they are copied only where there are any."""
+    return with_changes(contents, changes, within) if changes else contents
 
 
 def _place(place: str, changes: Iterable[str]) -> str:

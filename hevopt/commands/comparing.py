@@ -129,7 +129,7 @@ class Files:
             if path is not None:
                 check_table_file(path)
         if self.fronts:
-            from hevopt.studies.case import require_nox
+            from hevopt.studies.nox import require_nox
 
             for car in job.cars.cars:
                 require_nox(car, "--fronts")

@@ -243,8 +243,8 @@ def table(
     from hevopt.output.control_table import write_table
     from hevopt.powertrain.powertrain import build_problem
     from hevopt.studies.cars import cars_of
-    from hevopt.studies.case import require_nox
     from hevopt.studies.given import given_of, study_of
+    from hevopt.studies.nox import require_nox
 
     settings = study_of(given_of(_OPTIONS, given)).settings
     job = ComparisonJob(cars_of([architecture], settings), load_cycle(cycle), settings)

@@ -8,13 +8,12 @@ from hevopt.bounds.certificate import TARGET_GAP, Certificate, certify
 from hevopt.car.architecture import Architecture
 from hevopt.display.facts import Shown
 from hevopt.driving.cycle import Cycle
-from hevopt.errors import UnknownNoxError
-from hevopt.files.shown import printable
 from hevopt.powertrain.levels import Around
 from hevopt.powertrain.powertrain import TORQUE_LEVELS, around_plan, build_problem
 from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import dp
+from hevopt.studies.nox import require_nox
 from hevopt.studies.settings import Settings
 from hevopt.units import litres_per_100km
 
@@ -106,15 +105,6 @@ def prepare(
 def litres(car: Architecture, cycle: Cycle, fuel_kg: float) -> float:
     """Fuel of a car on a cycle in l/100 km."""
     return litres_per_100km(fuel_kg, car.engine.fuel_density_kgpm3, cycle.distance_m)
-
-
-def require_nox(car: Architecture, asking: str) -> None:
-    """UnknownNoxError where the car's engine has no data on NOx; `asking` is how a message names what needs it."""
-    if not car.engine.nox_known:
-        raise UnknownNoxError(
-            f"{car.name}: {asking} needs NOx data, but engine {printable(car.engine.name)!r} has none; "
-            "add nox_gps to its fuel_map, or nox_coefficients, or leave NOx out"
-        )
 
 
 def dp_case(

@@ -16,9 +16,10 @@ from hevopt.problem.problem import Problem
 from hevopt.strategies import Strategy, chosen, strategy_named
 from hevopt.studies.by_car import Progress, unseen
 from hevopt.studies.cars import cars_of
-from hevopt.studies.case import litres, prepare, require_nox
+from hevopt.studies.case import litres, prepare
 from hevopt.studies.comparison import Strategies
 from hevopt.studies.given import settings_from
+from hevopt.studies.nox import require_nox
 from hevopt.studies.pareto import GAP_ENOUGH, POINTS_MAX, SAME, Front, HalfPlane, front
 from hevopt.studies.rows import shortfall_steps
 from hevopt.studies.settings import Keywords, Settings

@@ -15,7 +15,8 @@ from hevopt.problem.problem import Plan, Problem, Trajectory
 from hevopt.problem.simulation import simulate
 from hevopt.strategies import Strategy, every_strategy, fitting, is_causal, strategy_named
 from hevopt.strategies.brought import Guarded
-from hevopt.studies.case import Case, require_nox
+from hevopt.studies.case import Case
+from hevopt.studies.nox import require_nox
 from hevopt.studies.rows import Row, row_of
 
 # In place of names: every strategy that fits the car.

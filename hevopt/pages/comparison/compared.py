@@ -17,10 +17,10 @@ from hevopt.reproduction.published import is_study
 from hevopt.strategies import Strategy, chosen
 from hevopt.studies.by_car import Progress, Watch, unseen
 from hevopt.studies.cars import Cars, cars_of
-from hevopt.studies.case import require_nox
 from hevopt.studies.comparison import Comparison, Strategies, compare_cars
 from hevopt.studies.fronts import front_of
 from hevopt.studies.given import settings_from
+from hevopt.studies.nox import require_nox
 from hevopt.studies.provenance import files_digests
 from hevopt.studies.sensitivity import effects_on
 from hevopt.studies.settings import Keywords, Settings

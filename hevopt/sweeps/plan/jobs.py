@@ -13,6 +13,7 @@ from hevopt.car.architecture import Architecture
 from hevopt.car_files.load import load_architecture
 from hevopt.driving.cycle import Cycle, load_cycle, shipped_cycles
 from hevopt.errors import HevoptError
+from hevopt.studies.nox import require_nox
 from hevopt.studies.provenance import cycle_contents, digest, physics_digest, versions
 
 NOX_WEIGHT = "nox_weight"
@@ -162,8 +163,6 @@ def jobs_of(
         car = load_architecture(architecture, changes)
         heaviest = max(weight for _, weight in members)
         if heaviest > 0:
-            from hevopt.studies.case import require_nox
-
             require_nox(car, f"{NOX_WEIGHT} {heaviest:g}")
         for cycle in cycles:
             inputs = inputs_digest(car, traces[cycle])

@@ -19,7 +19,8 @@ from hevopt.problem.problem import Problem
 from hevopt.strategies import Strategy, brought
 from hevopt.strategies.brought import located
 from hevopt.studies.case import Case as SolvedCase
-from hevopt.studies.case import dp_case, litres, require_nox
+from hevopt.studies.case import dp_case, litres
+from hevopt.studies.nox import require_nox
 from hevopt.studies.rows import Row, shortfall_steps
 from hevopt.studies.solved import run_case
 from hevopt.studies.status import Status
