@@ -146,6 +146,13 @@ def asked_of(
 
 
 @compiled(inline="always")
+def _left_nm(high_nm: float, behind_radps: float, car: LoopCar) -> float:
+    """What a hard launch, above idle speed, leaves to the clutch of an engine that speeds up to it."""
+    speeds_up = car.ways.inertia_kgm2[0] * max(behind_radps, 0.0) / car.driver.governor_s
+    return float(max(high_nm - speeds_up, 0.0))
+
+
+@compiled(inline="always")
 def inputs_of(
     car: LoopCar,
     state: State,
@@ -176,6 +183,8 @@ def inputs_of(
             target = max(ratio * (wheel + pedal.accel_mps2 / car.body.radius_m * step_s), target)
         governed = n + rate * (target - n)
         capacity = motor.capacity_nm(joint, split.clutch_nm, n - ratio * wheel, car.body.clutch)
+        if joint.launches and target > limits.idle_radps:
+            capacity = min(capacity, _left_nm(high, target - n, car))
         if joint.flows and capacity > 0.0:
             full = capacity
             capacity = closing_nm(car.ways.fluid, split.clutch_nm, n, ratio * wheel, full)

@@ -161,6 +161,24 @@ def record_step(
         row[COLUMNS + m - 1] = machine_nm[m]
 
 
+@compiled(bare=True)
+def way_asked(
+    car: LoopCar, asked: int, lever: Lever, joint: motor.Joined, pedal: PedalState, rolling_radps: float
+) -> int:  # fmt: skip
+    """The way that the driver takes of one asked for: none with a higher gear that the engine would idle in.
+
+    A car left behind by its trace has not the speed of which the plan's gear is: it keeps the gear that is in, or
+    has the one before again.
+    """
+    output = len(car.ways.inertia_kgm2) - 1
+    ratio = car.ways.wheel[asked, output]
+    slow = 0.0 < ratio * rolling_radps < car.limits.idle_radps and len(car.ways.fluid.locks) == 0
+    if not slow or joint.phase != motor.TURNING or pedal.force_n < 0.0:
+        return asked
+    before = lever.back if lever.way == asked and lever.back >= 0 else lever.way
+    return before if ratio < car.ways.wheel[before, output] else asked
+
+
 @compiled(inline="always")
 def after_step(
     car: LoopCar, task: LoopTask, work: Work, loop: Loop, place: Place, gives: Gives, pace: Pace, row: Array
@@ -176,7 +194,8 @@ def after_step(
     pedal = pressed(pedal, wanted, ahead, state.speed_mps, slope, car.body, car.driver, step_s)
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     keeps_nm = pace_nm(machine, car.limits)
-    lever = changed(lever, task.way[d], rolling, car.ways, car.fast_way, car.fast_radps,
+    way = way_asked(car, task.way[d], lever, joint, pedal, rolling)
+    lever = changed(lever, way, rolling, car.ways, car.fast_way, car.fast_radps,
                     car.shifting, step_s, keeps_nm)  # fmt: skip
     machine = turning(car.ways.wheel, lever.way, lever.from_way, lever.blend, 1) * wheel
     machine += car.ways.side[lever.way, 1] * state.side_radps
