@@ -13,6 +13,7 @@ import os
 import pickle
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from fnmatch import fnmatch
@@ -33,11 +34,15 @@ def _without(*modules: str) -> Iterator[None]:
         yield
     finally:
         for name in hidden:
-            del sys.modules[name]
+            sys.modules.pop(name, None)
 
 
+# The command line is a program of its own: what else imports modules or compiles with numba in other programs is to
+# find both as they are.
+_OWN_PROGRAM = "hevopt.cli" in sys.modules and threading.active_count() == 1
 # What numba would take along where it is installed; yaml reads settings from one file.
-with _without("coverage", "scipy", *([] if os.path.exists(".numba_config.yaml") else ["yaml"])):
+_TAKEN_ALONG = ["coverage", "scipy", *([] if os.path.exists(".numba_config.yaml") else ["yaml"])]
+with _without(*(_TAKEN_ALONG if _OWN_PROGRAM else [])):
     import numba
     from numba.core import types
     from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
@@ -71,7 +76,8 @@ def _type_of_array(array: Any, context: Any) -> Any:
     return _type_of_any_array(array, context)
 
 
-typeof_impl.register(np.ndarray)(_type_of_array)
+if _OWN_PROGRAM:
+    typeof_impl.register(np.ndarray)(_type_of_array)
 
 
 def compiled(

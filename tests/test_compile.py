@@ -9,11 +9,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import get_type_hints
 
+import numpy as np
 import pytest
 from numba.core.caching import CacheImpl
 from numba.core.dispatcher import Dispatcher
 
 import hevopt
+from hevopt import _compile
 from hevopt._compile import compiled
 from hevopt.forward._rows_kernels import Inputs, State
 
@@ -202,6 +204,9 @@ def test_a_loop_that_counts_no_references_gives_back_no_array():
 
 BROUGHT = """
 import sys
+import hevopt.cli
+
+before = set(sys.modules)
 import numpy as np
 from hevopt._compile import compiled
 
@@ -210,14 +215,59 @@ def first(x):
     return x[0]
 
 found = first(np.arange(3.0)), first(np.ones((2, 2), dtype=bool)[:, :1])
-print(*{"coverage", "scipy", "yaml", "numpy.ma"} & sys.modules.keys())
+print(*{"coverage", "scipy", "yaml", "numpy.ma"} & (sys.modules.keys() - before))
+import numba, scipy, yaml
+
+assert numba.njit(lambda matrix: np.linalg.solve(matrix, matrix))(np.eye(2))[1, 1] == 1
 """
 
 
-def test_kept_loops_take_along_nothing_that_they_never_use(tmp_path):
+def test_the_command_line_takes_along_nothing_that_its_loops_never_use_and_loads_it_when_asked(
+    tmp_path,
+):
     (tmp_path / "brought.py").write_text(BROUGHT)
     for _ in range(2):
         done = subprocess.run(
-            [sys.executable, "brought.py"], cwd=tmp_path, capture_output=True, text=True, check=True
+            [sys.executable, "brought.py"], cwd=tmp_path, capture_output=True, text=True
         )
+        assert done.returncode == 0, done.stderr
     assert done.stdout.split() == []
+
+
+HOST = """
+import sys
+import numba
+from numba.core.typing.typeof import typeof_impl
+import numpy as np
+
+own = typeof_impl.dispatch(np.ndarray)
+import hevopt._compile
+
+assert typeof_impl.dispatch(np.ndarray) is own
+assert numba.core.config._HAVE_YAML
+"""
+
+
+def test_another_program_that_loads_hevopt_keeps_its_numba_as_it_was():
+    done = subprocess.run([sys.executable, "-c", HOST], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_arrays_are_of_the_type_that_numba_gives_them(monkeypatch):
+    square = np.arange(9.0).reshape(3, 3)
+    kept = np.arange(3)
+    kept.flags.writeable = False
+    record = np.zeros(2, dtype=[("a", float), ("b", np.int32)])
+    arrays = [
+        square,
+        square.T,
+        square[::2, ::2],
+        kept,
+        np.array(1.0),
+        square > 2,
+        record,
+        record["b"],
+    ]
+    known = [_compile._type_of_any_array(array, None) for array in arrays]
+    monkeypatch.delitem(sys.modules, "numpy.ma", raising=False)
+    assert [_compile._type_of_array(array, None) for array in arrays] == known

@@ -67,7 +67,7 @@ class FreePull:
         helped: bool,
         engine_model: EngineModel,
     ) -> None:
-        self._named, self._engine_model = car, engine_model
+        self._of_car, self._engine_model = car, engine_model
         still = DriverGains(*[0.0] * len(DriverGains._fields))._replace(
             governor_s=driven.driver.governor_s, start_s=driven.driver.start_s
         )
@@ -101,7 +101,7 @@ class FreePull:
         course = FreeCourse(np.array([self._slowest(wheel)]), np.zeros(1),
                             np.zeros((1, len(self._work.machine_nm))), np.zeros(1, dtype=bool))  # fmt: skip
         loop = free.begun(self._car, task, course, start_j)
-        breathing = breathing_of(self._named, self._engine_model, loop.state.side_radps)
+        breathing = breathing_of(self._of_car, self._engine_model, loop.state.side_radps)
         advance = free.advance if breathing is None else breathing.advance_free
         task = _task(self._loads_w, 1.0)
         rows = np.zeros((steps, drive.COLUMNS + len(self._work.machine_nm) - 1))
@@ -141,12 +141,19 @@ class FreePull:
         return loop._replace(pedal=PedalState(force, 0.0, 0.0, 0.0, False), ahead_mps=1.0)
 
 
-def check_steady_pull(car: Architecture, fills: bool, boost_lag_s: float) -> None:
+def check_free_pull(car: Architecture, fills: bool, boost_lag_s: float) -> None:
     """DataError for a lag of the map's boost, or its filling, of an engine that has a speed of its own."""
-    if car.driveline.free_engine_speed and (fills or boost_lag_s > 0):
+    if not car.driveline.free_engine_speed:
+        return
+    if boost_lag_s > 0:
         raise DataError(
-            f"{car.name}: the steady map of an engine that has a speed of its own has no lag, and no machine that "
-            "only fills it; leave --boost-lag out, or drive it with --engine-model mean_value"
+            f"{car.name}: boost lag {boost_lag_s:g} s, but the steady map of an engine that has a speed of its own "
+            "has no lag; leave --boost-lag out (with --engine-model mean_value the turbocharger has its own)"
+        )
+    if fills:
+        raise DataError(
+            f"{car.name}: no machine turns with an engine that has a speed of its own, to fill what its "
+            "turbocharger lacks; leave fills out"
         )
 
 

@@ -20,7 +20,7 @@ class Driving:
 
     start_radps: speed at which the engine turns, or would if it did, as the task begins
     start_mps: speed of the car as it begins; course: None but of an engine that has a speed of its own
-    DataError for an engine model that is none, or that the car is not driven with.
+    DataError for an engine model that is none, or that the car has no data for.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ from hevopt.forward.forces import (
     tabulated,
     top_mps,
 )
-from hevopt.forward.free_pull import FreePull, check_steady_pull
+from hevopt.forward.free_pull import FreePull, check_free_pull
 from hevopt.forward.lines import Line, line_of
 from hevopt.forward.run import loop_car, shifting_of
 from hevopt.problem.arrays import Array, Indices
@@ -164,7 +164,7 @@ def _foot(
     car: Architecture, line: Line, boosts: bool, fills: bool, boost_lag_s: float, up_mps: Array
 ) -> Foot:
     """The pedal floored; a car without an engine launches and changes up at no speed of it, all by its machine."""
-    check_steady_pull(car, fills, boost_lag_s)
+    check_free_pull(car, fills, boost_lag_s)
     up = np.inf if car.electric or line.free else highest_radps(car, line) - _UP_BELOW_RADPS
     launch = 0.0 if car.electric else LAUNCH_RPM / RPM_PER_RADPS
     helps = boosts or fills or car.electric

@@ -111,7 +111,9 @@ class Solving:
         first begins with dynamic programming and certificate. Each then finds on the disk what the other compiled.
         """
         loaded = getattr(resolved, "stats", None)
-        if self.tally.of_first or loaded is None or not loaded.cache_misses or self.compiled:
+        if self.tally.of_first or self.compiled or loaded is None:
+            return
+        if not loaded.cache_misses or loaded.cache_path is None:
             return
         self.compiled.extend(wanted)
         for strategy in (strategy_named(name) for name in wanted if name != "dp"):

@@ -19,7 +19,8 @@ class ForwardFigures(Shown):
     """A row driven forward, see `DrivenPlan`; None where it could not be.
 
     status: its marks, "ok", or why it has no figures; decided: whether the strategy decided on the way
-    change_percent: charge-corrected fuel against the row's own; without an engine the energy from the battery
+    change_percent: charge-corrected fuel against the row's own; where neither burns any, the energy from the
+        battery, and None where the row took none
     """
 
     status: str
