@@ -6,15 +6,15 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, Strict
 
 from hevopt.files.shown import shown
-from hevopt.studies.settings import NEUTRAL
 
 NAMES_MAX = 1000
+_NEUTRAL = "neutral"
 
 
 def _soc_end(value: Any) -> Any:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if value != NEUTRAL and not (number and 0 <= value <= 1):
-        raise ValueError(f'allowed: "{NEUTRAL}" (that of the start), or 0 to 1')
+    if value != _NEUTRAL and not (number and 0 <= value <= 1):
+        raise ValueError(f'allowed: "{_NEUTRAL}" (that of the start), or 0 to 1')
     return value
 
 

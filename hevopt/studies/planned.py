@@ -30,18 +30,24 @@ class PlannedCase(NamedTuple):
 def planned_for(car: Architecture, cycle: Cycle, settings: Settings) -> PlannedCase:
     """The case of a car on a cycle, solved.
 
-    Where the cycle is faster than engine or machines turn, or the car has no plan for it, it is that of the cycle
-    at no more than a speed that the car can keep, unless the cycle lists gears for its own; where no plan reaches
-    the end charge, that of the highest that one does. InfeasibleError where that does not help either.
+    Where the car has no plan for the cycle, or none but one that lacks torque beyond the speed at which engine or
+    machines turn, it is that of the cycle at no more than a share of the car's highest speed, unless the cycle
+    lists gears for its own; where no plan reaches the end charge, that of one a little below the highest that one
+    does. InfeasibleError where that does not help either.
     """
-    fastest, shares = float(cycle.speed_mps.max()), _SHARES if cycle.gear is None else ()
+    speed, shares = cycle.speed_mps, _SHARES if cycle.gear is None else ()
+    # A step is driven at the mean of its ends.
+    fastest = float(np.max((speed[1:] + speed[:-1]) / 2))
     top = top_speed_mps(car, fastest) if shares else fastest
     failed: InfeasibleError | None = None
-    if top in (0.0, fastest):
-        try:
-            return _lasting(car, cycle, settings)
-        except InfeasibleError as error:
-            failed = error
+    try:
+        found = _lasting(car, cycle, settings)
+    except InfeasibleError as error:
+        failed = error
+    else:
+        missing_nm = found.case.problem.table.missing_torque_nm
+        if top in (0.0, fastest) or missing_nm is None or not missing_nm.any():
+            return found
     for share in shares if top > 0.0 else ():
         most = share * top
         slower = replace(cycle, speed_mps=np.minimum(cycle.speed_mps, most))

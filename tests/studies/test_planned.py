@@ -46,6 +46,18 @@ def test_a_car_s_highest_speed_is_that_of_the_part_that_turns_fastest():
     assert top_speed_mps(diesel, 100.0) == pytest.approx(top, abs=0.25)
 
 
+def test_a_single_sample_above_the_highest_speed_is_followed():
+    """A step is driven at the mean of its ends."""
+    car = load_architecture("A")
+    top = top_speed_mps(car, 100.0)
+    cycle = ramp(top - 3.0, 120, 200)
+    speed = cycle.speed_mps.copy()
+    peak = 150
+    speed[peak] = top + 2.0
+    found = planned_for(car, replace(cycle, speed_mps=speed), SHORT)
+    assert found.marks == () and found.case.cycle.speed_mps.max() > top
+
+
 def test_an_end_charge_that_no_plan_reaches_is_a_lower_one():
     climb = ramp(14.0, 20, 60, grade=0.3)
     car = load_architecture("p0_48v")
