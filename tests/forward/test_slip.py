@@ -166,11 +166,11 @@ def test_a_driven_trace_closes_its_books_at_every_step(planned, name):
 
 
 def test_ever_stiffer_tyres_drive_as_those_that_roll(planned):
-    rolls = follow(*planned["A"], step_s=0.05, handling=Handling(Tyre(lag_s=0.0)))
+    rolls = follow(*planned["A"], step_s=0.01, handling=Handling(Tyre(lag_s=0.0)))
     off = []
     for stiffness, length in ((10.0, 0.25), (30.0, 0.1), (100.0, 0.01)):
         tyre = Tyre(slips=True, stiffness=stiffness, relaxation_m=length)
-        slips = follow(*planned["A"], step_s=0.05, handling=Handling(tyre))
+        slips = follow(*planned["A"], step_s=0.01, handling=Handling(tyre))
         off.append(slips.fuel_kg / rolls.fuel_kg - 1)
     assert off[0] > off[1] > off[2] > 0 and off[2] < 1e-3
 

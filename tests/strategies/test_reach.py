@@ -39,8 +39,8 @@ def test_what_is_said_where_no_path_is_found_does_not_contradict_itself():
     problem = charged_once([100, 0], 0.0)
     choices = choices_of(problem)
     asked_j = float(simulate(problem, np.zeros(1, np.int64)).end_j)
-    within = _why_unreachable(problem, choices, 0.5 * asked_j)
-    beyond = _why_unreachable(problem, choices, 1.01 * asked_j)
+    within = str(_why_unreachable(problem, choices, 0.5 * asked_j))
+    beyond = str(_why_unreachable(problem, choices, 1.01 * asked_j))
     assert "no path was found that keeps within the SOC window 0 to 1" in within
     assert "the most any plan" not in within and "the most any plan" in beyond
 

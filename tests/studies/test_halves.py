@@ -219,16 +219,21 @@ def test_comparison_by_two_processes_is_that_of_one(monkeypatch: pytest.MonkeyPa
     assert all(0 <= done < total for done, total in told)
 
 
-@pytest.mark.parametrize(("of_first", "missed"), [(True, 1), (False, 0), (False, 1)])
+@pytest.mark.parametrize(
+    ("of_first", "missed", "kept"),
+    [(True, 1, "/x"), (False, 0, "/x"), (False, 1, "/x"), (False, 1, None)],
+)
 def test_a_forked_process_that_has_to_compile_begins_with_the_loops_of_strategies(
-    of_first: bool, missed: int, monkeypatch: pytest.MonkeyPatch
+    of_first: bool, missed: int, kept: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Where they are kept on the disk: else the other process would not find them."""
     solved: list[str] = []
 
     def noted(name: str) -> SimpleNamespace:
         return SimpleNamespace(usual=name != "mpc", solve=lambda problem: solved.append(name))
 
-    loop = SimpleNamespace(stats=SimpleNamespace(cache_misses={"types": 1} if missed else {}))
+    misses = {"types": 1} if missed else {}
+    loop = SimpleNamespace(stats=SimpleNamespace(cache_misses=misses, cache_path=kept))
     monkeypatch.setattr("hevopt.studies.by_car.resolved", loop)
     monkeypatch.setattr("hevopt.studies.by_car.strategy_named", noted)
     case: Any = None
@@ -236,7 +241,7 @@ def test_a_forked_process_that_has_to_compile_begins_with_the_loops_of_strategie
     solving.tally.of_first = of_first
     for _ in range(2):
         solving._compile(("ecms", "dp", "mpc", "conventional"), case)
-    assert solved == (["ecms", "conventional"] if missed and not of_first else [])
+    assert solved == (["ecms", "conventional"] if missed and kept and not of_first else [])
 
 
 def test_strategies_from_outside_are_asked_by_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
