@@ -80,8 +80,7 @@ class DrivenPlan(Shown):
     @property
     def burns(self) -> bool:
         """Whether fuel is what the run and its twin are compared by, and not the energy from the battery."""
-        burnt = self.run.fuel_kg > 0 or (self.backward.fuel_l_per_100km or 0.0) > 0
-        return burnt and not self.run.car.electric
+        return _burns(self.run, self.backward)
 
     @property
     def change_percent(self) -> float | None:
@@ -173,7 +172,7 @@ def _drive(
     run = run.against(cycle)
     _check_moved(run)
     found = beside(case, strategy, row, trajectory, run, asked=asked)
-    return replace(found, marks=planned.marks + found.marks) if planned.marks else found
+    return replace(found, marks=planned.marks + found.marks)
 
 
 def beside(
@@ -203,15 +202,16 @@ def beside(
         None if car.electric else litres(run.fuel_kg - price * surplus_j),
         None if car.electric else litres(case.certificate.bound_kg(end_j)[0]),
         run.nox_kg * 1e6 / km if car.engine.nox_known else None,
-        _difference(trajectory, run, price if _burn(trajectory, run) else None),
+        _difference(trajectory, run, price if _burns(run, row) else None),
         float(run.soc[-1] - np.interp(run.time_s[-1], case.cycle.time_s, trajectory.soc)),
         _marks(case, run, surplus_j),
         asked,
     )
 
 
-def _burn(trajectory: Trajectory, run: ForwardRun) -> bool:
-    return not run.car.electric and (run.fuel_kg > 0 or trajectory.total_fuel_kg > 0)
+def _burns(run: ForwardRun, twin: Row) -> bool:
+    burnt = run.fuel_kg > 0 or (twin.fuel_l_per_100km or 0.0) > 0
+    return burnt and not run.car.electric
 
 
 def _check_moved(run: ForwardRun) -> None:
